@@ -66,7 +66,8 @@ def _words(detail: ErrorDetails, loc: Loc, model: type[pydantic.BaseModel]) -> t
             return f"key '{detail['loc'][-1]}' is missing{_within(loc)}", f"add `{detail['loc'][-1]}: ...`"
         case "extra_forbidden":
             name = str(detail["loc"][-1])
-            return f"key '{name}' is unknown{_within(loc)}", name_fix(name, _known_keys(model, detail["loc"][:-1]))
+            known = _known_keys(model, detail["loc"][:-1])
+            return f"key '{name}' is unknown{_within(loc)}", name_fix(name, known)
         case "literal_error" | "enum":
             return f"{key} {got} is unknown", f"use one of {str(ctx['expected']).replace(' or ', ', ')}"
         case "union_tag_invalid":

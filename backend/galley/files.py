@@ -1,4 +1,4 @@
-"""The one loader for every YAML file that a person writes: all problems at once, each with its line and its fix."""
+"""The one loader for every YAML file that a person writes: all problems at once, with line and fix."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Loaded(Generic[M]):
     text_lines: Mapping[Loc, int]
 
     def line(self, *loc: str | int) -> int:
-        """The line (from 1) of a key path such as `("rounds", 0, "layout")`, or of the nearest thing around it."""
+        """The line (from 1) of a key path such as `("rounds", 0, "layout")`, or of what is around it."""
         return _line(self.lines, loc)
 
     def text_line(self, *loc: str | int, row: int) -> int:
@@ -66,7 +66,7 @@ def faults(problems: Iterable[tuple[Loc, str, str]]) -> PydanticCustomError:
 def load(
     path: Path, model: type[M], shown: str | None = None, context: Mapping[str, Any] | None = None
 ) -> Loaded[M]:
-    """The file at `path` as a validated `model`; `shown` is how messages name it, `context` goes to validators.
+    """The file at `path` as a validated `model`; messages call it `shown`, validators get `context`.
 
     Raises:
         InvalidFiles: everything that is wrong with the file: unreadable, not YAML, keys doubled, unknown or
@@ -103,7 +103,8 @@ def _compose(path: Path, name: str) -> Node:
         raw = path.read_bytes()
     except OSError as error:
         told = f"cannot be read ({error.strerror or error})"
-        raise InvalidFiles([Problem(name, None, told, "check that the file is there and may be read")]) from None
+        fix = "check that the file is there and may be read"
+        raise InvalidFiles([Problem(name, None, told, fix)]) from None
     if len(raw) > LARGEST_FILE_BYTES:
         told = f"the file has {len(raw)} bytes, more than {LARGEST_FILE_BYTES}"
         raise InvalidFiles([Problem(name, None, told, "make it smaller")])
@@ -117,15 +118,16 @@ def _compose(path: Path, name: str) -> Node:
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         told = ", ".join(part for part in (error.context, error.problem) if part)
-        line = None if mark is None else mark.line + 1
+        place = None if mark is None else mark.line + 1
         fix = "check indentation, colons and quotes on this line and the one before"
-        raise InvalidFiles([Problem(name, line, f"not YAML: {told}", fix)]) from None
+        raise InvalidFiles([Problem(name, place, f"not YAML: {told}", fix)]) from None
     except (YAMLError, ValueError) as error:
         told = f"not YAML: {str(error).splitlines()[0]}"
         raise InvalidFiles([Problem(name, None, told, "keep to plain text")]) from None
     if root is None:
         raise InvalidFiles([Problem(name, 1, "the file is empty", "write its keys, or remove it")])
-    return root
+    document: Node = root
+    return document
 
 
 class _Tree:
@@ -143,7 +145,8 @@ class _Tree:
         self._nodes += 1
         if self._nodes > MOST_NODES or len(loc) > 50:
             told = f"the file unfolds to more than {MOST_NODES} values or 50 levels"
-            raise InvalidFiles([Problem(self.path, node.start_mark.line + 1, told, "use fewer aliases (`*name`)")])
+            fix = "use fewer aliases (`*name`)"
+            raise InvalidFiles([Problem(self.path, node.start_mark.line + 1, told, fix)])
         self.lines.setdefault(loc, node.start_mark.line + 1)
         if isinstance(node, MappingNode):
             return self._mapping(node, loc)
@@ -167,7 +170,7 @@ class _Tree:
             values[key] = self.value(value_node, (*loc, key))
         return values
 
-    def _scalar(self, node: ScalarNode, loc: Loc) -> Any:
+    def _scalar(self, node: Node, loc: Loc) -> Any:
         if node.style in ("|", ">"):
             self.text_lines[loc] = node.start_mark.line + 2
         try:

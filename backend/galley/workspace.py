@@ -34,7 +34,7 @@ class Workspace:
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
         if not self.path.is_dir():
-            raise GalleyError(f"{self.path}: there is no such folder; make a workspace with `galley init DIR`")
+            raise GalleyError(f"{self.path}: no such folder; make a workspace with `galley init DIR`")
         if not any((self.path / folder).is_dir() for folder in ("studies", "layouts")):
             raise GalleyError(
                 f"{self.path}: not a workspace, it holds neither studies/ nor layouts/; "
@@ -67,7 +67,8 @@ class Workspace:
         known = self.names(kind)
         if name not in known:
             one = {"agents": "agent", "studies": "study"}.get(kind, kind.removesuffix("s"))
-            raise GalleyError(f"{self.shown(self.folder(kind))}: no {one} is named '{name}'; {name_fix(name, known)}")
+            place = self.shown(self.folder(kind))
+            raise GalleyError(f"{place}: no {one} is named '{name}'; {name_fix(name, known)}")
         return self.folder(kind) / f"{name}{_PLACES[kind][1]}"
 
     def shown(self, path: Path) -> str:
@@ -85,7 +86,7 @@ class Workspace:
             GalleyError: this installation has none.
         """
         package = Path(__file__).resolve().parent
-        for candidate in (package / "starter", package.parents[1]):
+        for candidate in (package / "_starter", package.parents[1]):
             if (candidate / "layouts").is_dir() and (candidate / "studies").is_dir():
                 return candidate
         raise GalleyError("this installation of Galley holds no starter workspace; install it again")
