@@ -1,0 +1,28 @@
+"""`galley export`: a study's records as CSV."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from galley.commands.options import DatabaseOption, WorkspaceOption, database_url
+
+
+def export(
+    study: Annotated[str, typer.Argument(help="Name of the study.")],
+    out: Annotated[Path, typer.Option(help="Folder to write the CSV files to.")],
+    workspace: WorkspaceOption = Path(),
+    database: DatabaseOption = None,
+) -> None:
+    """Write participants, rounds, ticks, responses and events as CSV, with their data dictionary."""
+    from galley.records.export import export_study
+    from galley.records.store import Store
+
+    store = Store.open(database_url(workspace, database))
+    try:
+        export_study(store, study, out)
+    finally:
+        store.close()
+    typer.echo(f"Wrote {out}")

@@ -1,0 +1,69 @@
+"""`galley trajectories`: recorded games read, replayed and measured."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from galley.commands.options import DatabaseOption, JsonOption, WorkspaceOption, database_url
+
+app = typer.Typer(help="Recorded games: import, verify, measure.", no_args_is_help=True)
+
+
+@app.command("import")
+def import_files(
+    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Pickles of human games.")],
+    json_: JsonOption = False,
+) -> None:
+    """Replay the human games of the overcooked-ai package and compare every transition."""
+    from galley.kitchen.human_data import import_files as read
+
+    report = read(files)
+    figures = {
+        "games": report.games,
+        "transitions": report.transitions,
+        "matched": report.matched,
+        "mismatched": report.mismatched,
+    }
+    typer.echo(json.dumps(figures) if json_ else " ".join(f"{key}={value}" for key, value in figures.items()))
+    if report.mismatched:
+        raise typer.Exit(1)
+
+
+@app.command()
+def verify(
+    study: Annotated[str, typer.Argument(help="Name of the study.")],
+    workspace: WorkspaceOption = Path(),
+    database: DatabaseOption = None,
+) -> None:
+    """Replay every stored round of a study and compare it bit for bit with what was stored."""
+    from galley.records.store import Store
+    from galley.records.verify import verify_study
+
+    store = Store.open(database_url(workspace, database))
+    try:
+        report = verify_study(store, study)
+    finally:
+        store.close()
+    typer.echo(str(report))
+    if not report.ok:
+        raise typer.Exit(1)
+
+
+@app.command()
+def measure(
+    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Trajectory files (JSON Lines).")],
+    json_: JsonOption = False,
+) -> None:
+    """Print score, deliveries, workload, concurrent motion and stuck ticks of each trajectory."""
+    from galley.kitchen.measures import measures
+    from galley.kitchen.trajectory import read
+
+    for file in files:
+        trajectory = read(file)
+        figures = {"file": str(file), **asdict(measures(trajectory))}
+        typer.echo(json.dumps(figures) if json_ else " ".join(f"{k}={v}" for k, v in figures.items()))
