@@ -1,0 +1,33 @@
+"""The kitchen: layouts, rules, observations, trajectories. Needs NumPy and Numba only."""
+
+from galley.kitchen.batch import KitchenBatch
+from galley.kitchen.codes import ACTIONS, EAST, FACINGS, INTERACT, NORTH, SOUTH, STAY, THINGS, WEST
+from galley.kitchen.events import EVENTS, Event, decode
+from galley.kitchen.kitchen import Kitchen
+from galley.kitchen.layout import Layout, Rules
+from galley.kitchen.state import ChefView, KitchenView, PotView, from_view, state_size, view
+
+__all__ = [
+    "ACTIONS",
+    "EAST",
+    "EVENTS",
+    "FACINGS",
+    "INTERACT",
+    "NORTH",
+    "SOUTH",
+    "STAY",
+    "THINGS",
+    "WEST",
+    "ChefView",
+    "Event",
+    "Kitchen",
+    "KitchenBatch",
+    "KitchenView",
+    "Layout",
+    "PotView",
+    "Rules",
+    "decode",
+    "from_view",
+    "state_size",
+    "view",
+]

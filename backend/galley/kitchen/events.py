@@ -1,0 +1,110 @@
+"""What happened in a tick, as named events: one table for code, docs and records."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from galley.kitchen.codes import (
+    BIT_BLOCKED,
+    BIT_DELIVER,
+    BIT_FETCH,
+    BIT_PAID,
+    BIT_PICK_UP,
+    BIT_POT,
+    BIT_PUT_DOWN,
+    BIT_TAKE,
+    CELL,
+    CELLS,
+    CHEF,
+    COUNTER,
+    FACING,
+    FLOOR,
+    OUT_EVENTS,
+    OUT_READY,
+    POT,
+    POT_COUNT,
+    SERVING,
+    SOUP_OF_KIND,
+    THINGS,
+    TICK,
+)
+from galley.kitchen.layout import Layout
+
+EVENTS: Final[dict[str, str]] = {
+    "pick_up": "A chef takes a thing from a dispenser, a counter or (a finished soup, with a dish) a pot.",
+    "put_down": "A chef puts the held thing on an empty counter.",
+    "potting": "A chef puts an ingredient into a pot.",
+    "soup_ready": "A pot's soup has cooked for the full time; no seat.",
+    "delivery": "A chef delivers a soup; reward is 0 when it did not match the first order.",
+    "blocked": "A chef moves but stays in its cell; place is what was in the way, floor being the other chef.",
+}
+"""Every kind of event, with its meaning."""
+
+PLACES: Final = ("dispenser", "counter", "pot", "serving", "floor")
+
+_PLACE_OF_TILE: Final = {FLOOR: "floor", COUNTER: "counter", POT: "pot", SERVING: "serving"}
+
+# First bit, number of bits, code of the first bit's thing, kind, place.
+_GROUPS: Final = (
+    (BIT_TAKE, 3, 1, "pick_up", "dispenser"),
+    (BIT_PICK_UP, 5, 1, "pick_up", "counter"),
+    (BIT_FETCH, 2, 4, "pick_up", "pot"),
+    (BIT_PUT_DOWN, 5, 1, "put_down", "counter"),
+    (BIT_POT, 2, 1, "potting", "pot"),
+    (BIT_DELIVER, 2, 4, "delivery", "serving"),
+)
+
+
+@dataclass(frozen=True)
+class Event:
+    """One happening: `tick` counts from 0, `seat` is None for a pot's own, (x, y) is the cell it happened to."""
+
+    tick: int
+    seat: int | None
+    kind: str
+    thing: str
+    place: str
+    x: int
+    y: int
+    reward: int = 0
+
+
+def decode(
+    layout: Layout, before: NDArray[np.int16], after: NDArray[np.int16], out: NDArray[np.int32]
+) -> tuple[Event, ...]:
+    """The events of one tick: seat 0's, seat 1's, then the pots'.
+
+    `before` and `after` are the states int16[S] around the tick, `out` int32[4] is what the tick wrote.
+    """
+    if not out[OUT_EVENTS:].any():
+        return ()
+    tick = int(before[TICK])
+    events = []
+    for seat in (0, 1):
+        mask = int(out[OUT_EVENTS + seat])
+        if not mask:
+            continue
+        facing = int(after[CHEF * seat + FACING])
+        x, y = layout.place(int(before[CHEF * seat + CELL]))
+        x += (facing == 2) - (facing == 3)
+        y += (facing == 1) - (facing == 0)
+        if mask >> BIT_BLOCKED & 1:
+            place = _PLACE_OF_TILE.get(int(layout.tiles[y, x]), "dispenser")
+            events.append(Event(tick, seat, "blocked", "", place, x, y))
+        for first, bits, thing, kind, place in _GROUPS:
+            group = mask >> first & ((1 << bits) - 1)
+            if group:
+                name = THINGS[thing + group.bit_length() - 1]
+                paid = kind == "delivery" and mask >> BIT_PAID & 1
+                reward = layout.rules.delivery_reward if paid else 0
+                events.append(Event(tick, seat, kind, name, place, x, y, reward))
+    ready = int(out[OUT_READY])
+    for number, place_ in enumerate(layout.pots):
+        if ready >> number & 1:
+            kind_code = int(after[CELLS + layout.cell(place_)]) % POT_COUNT
+            events.append(Event(tick, None, "soup_ready", THINGS[kind_code + SOUP_OF_KIND], "pot", *place_))
+    return tuple(events)
