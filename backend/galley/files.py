@@ -171,7 +171,7 @@ class _Tree:
         return values
 
     def _scalar(self, node: Node, loc: Loc) -> Any:
-        if node.style in ("|", ">"):
+        if isinstance(node, ScalarNode) and node.style in ("|", ">"):
             self.text_lines[loc] = node.start_mark.line + 2
         try:
             value = self._scalars.construct_object(node)
