@@ -46,7 +46,7 @@ def check(workspace: WorkspaceOption = Path()) -> None:
 def play(
     first: Annotated[str, typer.Argument(metavar="A", help="Name of an agent.")],
     second: Annotated[str, typer.Argument(metavar="B", help="Name of its partner.")],
-    layout: Annotated[str, typer.Option(help="Layout to play on.")],
+    layout: Annotated[str, typer.Option(metavar="NAME", help="Layout to play on.")],
     games: Annotated[int, typer.Option(min=1, help="Games for each seat order.")] = 100,
     seed: Annotated[int, typer.Option(help="Seed of the first game.")] = 0,
     workspace: WorkspaceOption = Path(),

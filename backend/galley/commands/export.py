@@ -12,7 +12,7 @@ from galley.commands.options import DatabaseOption, WorkspaceOption, database_ur
 
 def export(
     study: Annotated[str, typer.Argument(help="Name of the study.")],
-    out: Annotated[Path, typer.Option(help="Folder to write the CSV files to.")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder to write the CSV files to.")],
     workspace: WorkspaceOption = Path(),
     database: DatabaseOption = None,
 ) -> None:

@@ -14,12 +14,17 @@ WorkspaceArgument = Annotated[
 ]
 WorkspaceOption = Annotated[
     Path,
-    typer.Option("--workspace", help="Folder that holds studies/, layouts/, agents/ and questionnaires/."),
+    typer.Option(
+        "--workspace",
+        metavar="DIR",
+        help="Folder that holds studies/, layouts/, agents/ and questionnaires/.",
+    ),
 ]
 DatabaseOption = Annotated[
     str | None,
     typer.Option(
         "--database",
+        metavar="URL",
         help="Where the records are, as a URL (sqlite:///file, postgresql://host/name).",
         show_default="SQLite in the workspace: .data/galley.sqlite",
     ),

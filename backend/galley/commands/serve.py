@@ -14,9 +14,11 @@ def serve(
     workspace: WorkspaceArgument = Path(),
     study: Annotated[
         str | None,
-        typer.Option(help="Serve this study alone.", show_default="every study of the workspace"),
+        typer.Option(
+            metavar="NAME", help="Serve this study alone.", show_default="every study of the workspace"
+        ),
     ] = None,
-    host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
+    host: Annotated[str, typer.Option(metavar="ADDRESS", help="Address to listen on.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on.")] = 8000,
     database: DatabaseOption = None,
 ) -> None:
