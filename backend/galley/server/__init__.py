@@ -1,0 +1,1 @@
+"""While it happens: pages, the play socket, live rounds and their clock."""

@@ -1,0 +1,185 @@
+"""The one thread in which agents observe and decide, many rounds' agents in one batch."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass
+from queue import Empty, SimpleQueue
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from galley.agents.protocol import Agent
+from galley.agents.together import act_together
+from galley.kitchen import ACTIONS
+
+T = TypeVar("T")
+LOG = logging.getLogger(__name__)
+FAULT_ERROR = "error"
+FAULT_INVALID = "invalid"
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What came of a question: an action, or None with the fault; `decision_ms` from asking to answering."""
+
+    action: int | None
+    decision_ms: float
+    fault: str | None
+
+
+class Question:
+    """What one agent shall do at one tick; `answer` is there as soon as the thinking thread has set it."""
+
+    __slots__ = ("answer", "asked_s", "mind", "seen", "state", "tick")
+
+    def __init__(
+        self, mind: Mind, tick: int, state: NDArray[np.int16], seen: tuple[NDArray[np.int16], tuple[int, int]] | None
+    ) -> None:
+        self.mind = mind
+        self.tick = tick
+        self.state = state
+        self.seen = seen
+        self.asked_s = time.monotonic()
+        self.answer: Answer | None = None
+
+
+class Mind:
+    """One agent at work in one round. Only the thinking thread touches the agent itself."""
+
+    def __init__(self, thinking: Thinking, agent: Agent, name: str) -> None:
+        self._thinking = thinking
+        self.agent = agent
+        self.name = name
+        self.newest: Question | None = None
+        self.told_fault = False
+
+    def ask(
+        self, tick: int, state: NDArray[np.int16], seen: tuple[NDArray[np.int16], tuple[int, int]] | None
+    ) -> Question:
+        """Ask for the action at `tick` in `state` (int16 [S], not changed afterwards); returns at once.
+
+        `seen` is the state before and the joint action that led here, shown to the agent first; None at the start
+        and when the agent has been shown it already. A question that is overtaken by the next is never answered.
+        """
+        question = Question(self, tick, state, seen)
+        self.newest = question
+        self._thinking.put(question)
+        return question
+
+
+class Thinking:
+    """Owns the thinking thread: `start` it, `mind` for each round's agent, `stop` it."""
+
+    def __init__(self, window_s: float = 0.001) -> None:
+        self._window_s = window_s
+        self._work: SimpleQueue[Question | Callable[[], None] | None] = SimpleQueue()
+        self._thread: threading.Thread | None = None
+
+    def start(self) -> None:
+        """Begin to think."""
+        self._thread = threading.Thread(target=self._run, name="galley-thinking", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Finish what has been asked and end the thread."""
+        if self._thread is not None:
+            self._work.put(None)
+            self._thread.join()
+            self._thread = None
+
+    def put(self, question: Question) -> None:
+        """Queue a question."""
+        self._work.put(question)
+
+    def do(self, work: Callable[[], T]) -> Future[T]:
+        """The result of `work`, done in the thinking thread in its turn."""
+        done: Future[T] = Future()
+
+        def job() -> None:
+            if not done.set_running_or_notify_cancel():
+                return
+            try:
+                done.set_result(work())
+            except BaseException as error:  # handed to whoever waits for the result
+                done.set_exception(error)
+
+        self._work.put(job)
+        return done
+
+    # ---- the thinking thread -------------------------------------------------------------------------------
+
+    def _run(self) -> None:
+        while True:
+            batch = [self._work.get()]
+            if self._window_s > 0 and isinstance(batch[0], Question):
+                time.sleep(self._window_s)
+            try:
+                while True:
+                    batch.append(self._work.get_nowait())
+            except Empty:
+                pass
+            questions: list[Question] = []
+            for work in batch:
+                if isinstance(work, Question):
+                    self._show(work)
+                    questions.append(work)
+                elif work is not None:
+                    work()
+            self._decide([question for question in questions if question.mind.newest is question])
+            if None in batch:
+                return
+
+    def _show(self, question: Question) -> None:
+        if question.seen is None:
+            return
+        try:
+            question.mind.agent.observe(*question.seen)
+        except Exception:  # whatever a researcher's agent raises, the round goes on
+            self._tell(question.mind, "raised while observing")
+
+    def _decide(self, questions: list[Question]) -> None:
+        if not questions:
+            return
+        try:
+            actions: list[Any] = list(
+                act_together(
+                    [question.mind.agent for question in questions],
+                    [question.state for question in questions],
+                    [question.tick for question in questions],
+                )
+            )
+        except Exception:  # one agent's fault must not cost the others their turn: ask each by itself
+            for question in questions:
+                self._decide_alone(question)
+            return
+        for question, action in zip(questions, actions, strict=True):
+            self._answer(question, action)
+
+    def _decide_alone(self, question: Question) -> None:
+        try:
+            action: Any = question.mind.agent.act(question.state, question.tick)
+        except Exception:  # as in _decide
+            self._tell(question.mind, "raised while deciding")
+            self._answer(question, None, FAULT_ERROR)
+            return
+        self._answer(question, action)
+
+    def _answer(self, question: Question, action: Any, fault: str | None = None) -> None:
+        decision_ms = (time.monotonic() - question.asked_s) * 1000.0
+        if fault is None and not (isinstance(action, (int, np.integer)) and 0 <= action < len(ACTIONS)):
+            self._tell(question.mind, f"decided {action!r}, which is no action", trace=False)
+            action, fault = None, FAULT_INVALID
+        question.answer = Answer(None if action is None else int(action), decision_ms, fault)
+
+    @staticmethod
+    def _tell(mind: Mind, what: str, trace: bool = True) -> None:
+        """Log an agent's first fault in a round; the records hold them all."""
+        if not mind.told_fault:
+            mind.told_fault = True
+            LOG.error("agent %s %s; it stays where it is", mind.name, what, exc_info=trace)
