@@ -1,0 +1,1 @@
+"""Who acts: the agent protocol, scripted and network agents, bundles, and games between them."""

@@ -1,0 +1,41 @@
+"""Agents that need not look: one stays, one acts at random."""
+
+from __future__ import annotations
+
+from numpy import int16
+from numpy.typing import NDArray
+
+from galley.kitchen import ACTIONS, STAY, Layout
+from galley.randomness import uniform
+
+
+class Stay:
+    """An agent that never moves."""
+
+    def reset(self, layout: Layout, seat: int, seed: int) -> None:
+        """Nothing to remember."""
+
+    def act(self, state: NDArray[int16], tick: int) -> int:
+        """Always to stay."""
+        return STAY
+
+    def observe(self, state: NDArray[int16], joint_action: tuple[int, int]) -> None:
+        """Nothing to note."""
+
+
+class Random:
+    """An agent that takes each of the six actions with the same probability."""
+
+    def __init__(self) -> None:
+        self._seat, self._seed = 0, 0
+
+    def reset(self, layout: Layout, seat: int, seed: int) -> None:
+        """Draw from this seed and seat from now on."""
+        self._seat, self._seed = seat, seed
+
+    def act(self, state: NDArray[int16], tick: int) -> int:
+        """An action drawn uniformly."""
+        return int(uniform(self._seed, self._seat, tick) * len(ACTIONS))
+
+    def observe(self, state: NDArray[int16], joint_action: tuple[int, int]) -> None:
+        """Nothing to note."""

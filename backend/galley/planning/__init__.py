@@ -1,0 +1,1 @@
+"""Who thinks ahead: distances in a kitchen and the myopic human."""
