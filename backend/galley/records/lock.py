@@ -1,0 +1,44 @@
+"""One serving process per SQLite file."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+from pathlib import Path
+from typing import Self
+
+from galley.errors import GalleyError
+
+
+class ServingLock:
+    """Held from `ServingLock(file)` to `release()` or the death of the process, however it dies.
+
+    Raises: GalleyError if another process, or another store of this one, holds it.
+    """
+
+    def __init__(self, file: Path) -> None:
+        path = file.with_name(file.name + "-serving")
+        self._descriptor: int | None = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+        try:
+            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            holder = os.read(self._descriptor, 32).decode(errors="replace").strip() or "unknown"
+            self.release()
+            raise GalleyError(
+                f"{file}: process {holder} already serves this database; "
+                "stop it, name another file with --database, or use PostgreSQL for several servers"
+            ) from None
+        os.truncate(self._descriptor, 0)
+        os.write(self._descriptor, str(os.getpid()).encode())
+
+    def release(self) -> None:
+        """Let the next process serve; the file stays, since removing it would race with one opening it."""
+        if self._descriptor is not None:
+            os.close(self._descriptor)
+            self._descriptor = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.release()

@@ -1,0 +1,80 @@
+"""Reads: rows of the database as the frozen rows of `galley.records.rows`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy import Connection, select
+
+from galley.records.rows import RoundRow, SeatRow, VisitRow
+from galley.records.tables import ROUNDS, SEATS, TICKS, VISITS
+
+
+def visit(connection: Connection, token: str) -> VisitRow | None:
+    """The visit with this token."""
+    found = connection.execute(select(VISITS).where(VISITS.c.token == token)).mappings().one_or_none()
+    return None if found is None else visit_row(dict(found))
+
+
+def visits(connection: Connection, study: str) -> Iterator[VisitRow]:
+    """Every visit of a study in order of arrival, read a few at a time."""
+    ids = connection.execute(
+        select(VISITS.c.id).where(VISITS.c.study == study).order_by(VISITS.c.visit_no)
+    ).scalars()
+    for visit_id in ids.all():
+        yield visit_row(
+            dict(connection.execute(select(VISITS).where(VISITS.c.id == visit_id)).mappings().one())
+        )
+
+
+def visit_row(values: dict[str, Any]) -> VisitRow:
+    """A VisitRow of one row of the table."""
+    return VisitRow(**{**values, "seed": int(values["seed"])})
+
+
+def round_of(connection: Connection, visit_id: int, step_id: str) -> RoundRow | None:
+    """The round that a visit plays at a step."""
+    found = connection.execute(
+        select(SEATS.c.round_id).where(SEATS.c.visit_id == visit_id, SEATS.c.step_id == step_id)
+    ).scalar_one_or_none()
+    return None if found is None else round_row(connection, found)
+
+
+def rounds_of_visit(connection: Connection, visit_id: int) -> list[int]:
+    """The ids of a visit's rounds in the order they were set up."""
+    query = select(SEATS.c.round_id).where(SEATS.c.visit_id == visit_id).order_by(SEATS.c.round_id)
+    return list(connection.execute(query).scalars())
+
+
+def rounds_of_study(connection: Connection, study: str) -> list[int]:
+    """The ids of a study's rounds in the order they were set up."""
+    return list(
+        connection.execute(select(ROUNDS.c.id).where(ROUNDS.c.study == study).order_by(ROUNDS.c.id)).scalars()
+    )
+
+
+def round_row(connection: Connection, round_id: int) -> RoundRow | None:
+    """The round with this id and its joint actions."""
+    found = connection.execute(select(ROUNDS).where(ROUNDS.c.id == round_id)).mappings().one_or_none()
+    if found is None:
+        return None
+    seats = connection.execute(
+        select(SEATS).where(SEATS.c.round_id == round_id).order_by(SEATS.c.seat)
+    ).mappings()
+    return RoundRow(
+        **{**found, "seed": int(found["seed"])},
+        seats=tuple(SeatRow(**{name: row[name] for name in SeatRow.__slots__}) for row in seats),
+        joint_actions=joint_actions(connection, round_id),
+    )
+
+
+def joint_actions(connection: Connection, round_id: int) -> NDArray[np.uint8]:
+    """The joint actions of a round in order, uint8 [T, 2]."""
+    query = (
+        select(TICKS.c.action_0, TICKS.c.action_1).where(TICKS.c.round_id == round_id).order_by(TICKS.c.tick)
+    )
+    pairs = [tuple(row) for row in connection.execute(query)]
+    return np.array(pairs, dtype=np.uint8).reshape(-1, 2)
