@@ -5,11 +5,14 @@ from galley.kitchen.codes import ACTIONS, EAST, FACINGS, INTERACT, NORTH, SOUTH,
 from galley.kitchen.events import EVENTS, Event, decode
 from galley.kitchen.kitchen import Kitchen
 from galley.kitchen.layout import Layout, Rules
+from galley.kitchen.observations import ENCODINGS, Encoder
 from galley.kitchen.state import ChefView, KitchenView, PotView, from_view, state_size, view
+from galley.kitchen.warm import warm
 
 __all__ = [
     "ACTIONS",
     "EAST",
+    "ENCODINGS",
     "EVENTS",
     "FACINGS",
     "INTERACT",
@@ -19,6 +22,7 @@ __all__ = [
     "THINGS",
     "WEST",
     "ChefView",
+    "Encoder",
     "Event",
     "Kitchen",
     "KitchenBatch",
@@ -30,4 +34,5 @@ __all__ = [
     "from_view",
     "state_size",
     "view",
+    "warm",
 ]

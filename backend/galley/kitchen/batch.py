@@ -44,7 +44,7 @@ class KitchenBatch:
             self.states[mask] = self._start
 
     def step(self, actions: NDArray[np.integer]) -> NDArray[np.int32]:
-        """int32[B]: the reward of one tick; `actions` integer[B,2], seat 0 and seat 1. Finished kitchens stay put.
+        """int32[B]: the rewards of one tick; `actions` is integer[B,2]. Finished kitchens do not change.
 
         Raises:
             ValueError: `actions` has another shape or holds something else than the six codes.

@@ -1,4 +1,4 @@
-"""The small numbers that kitchens are made of: actions, facings, tiles, things, and where each stands in an array.
+"""The small numbers that kitchens are made of: actions, facings, tiles, things, places in arrays.
 
 The compiled kernels take these in as constants. Numba's cache does not notice a change in this file,
 so touch the kernel files (`rules.py`, `observation_kernels.py`) whenever a number here changes.
@@ -69,7 +69,7 @@ OUT_REWARD: Final = 0
 OUT_EVENTS: Final = 1  # seat 0, then seat 1: bit masks
 OUT_READY: Final = 3  # bit mask over the pots in row-major order
 
-# Bits of a seat's event mask. A group covers consecutive things, starting with the onion unless said otherwise.
+# Bits of a seat's event mask. A group covers consecutive things, in the order of their codes.
 BIT_TAKE: Final = 0  # onion, tomato, dish from a dispenser
 BIT_PICK_UP: Final = 3  # any of the five things from a counter
 BIT_FETCH: Final = 8  # onion soup, tomato soup from a pot

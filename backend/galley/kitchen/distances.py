@@ -53,9 +53,9 @@ def _costs(tiles: NDArray[uint8], targets: NDArray[int32]) -> NDArray[int16]:
 
 
 def action_costs(layout: Layout, targets: NDArray[np.integer]) -> NDArray[np.int16]:
-    """int16[H*W*4, K]: fewest actions from each pose to a pose facing each target cell (integer [K], no floor).
+    """int16[H*W*4, K]: fewest actions from each pose to one that faces the target cells (integer [K]).
 
-    A pose is `cell * 4 + facing`. 0 means that the chef faces the target already; `UNREACHABLE` (-1) that it
-    never can. The other chef is left out of account.
+    Targets are not floor. A pose is `cell * 4 + facing`. 0 means that the chef faces the target already;
+    `UNREACHABLE` (-1) that it never can. The other chef is left out of account.
     """
     return _costs(layout.tiles, np.ascontiguousarray(targets, dtype=np.int32))

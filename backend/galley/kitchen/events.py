@@ -40,7 +40,7 @@ EVENTS: Final[dict[str, str]] = {
     "potting": "A chef puts an ingredient into a pot.",
     "soup_ready": "A pot's soup has cooked for the full time; no seat.",
     "delivery": "A chef delivers a soup; reward is 0 when it did not match the first order.",
-    "blocked": "A chef moves but stays in its cell; place is what was in the way, floor being the other chef.",
+    "blocked": "A move leaves the chef in its cell; place is what was in the way (floor: the other chef).",
 }
 """Every kind of event, with its meaning."""
 
@@ -61,7 +61,7 @@ _GROUPS: Final = (
 
 @dataclass(frozen=True)
 class Event:
-    """One happening: `tick` counts from 0, `seat` is None for a pot's own, (x, y) is the cell it happened to."""
+    """One happening at cell (x, y): `tick` counts from 0, `seat` is None for a pot's own."""
 
     tick: int
     seat: int | None

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from galley.kitchen import rules
-from galley.kitchen.codes import ACTIONS, DELIVERIES, ORDERS_DELIVERED, TICK
+from galley.kitchen.codes import ACTIONS, DELIVERIES, TICK
 from galley.kitchen.events import Event, decode
 from galley.kitchen.layout import Layout
 from galley.kitchen.state import KitchenView, state_size, view
@@ -58,11 +58,7 @@ class Kitchen:
     @property
     def done(self) -> bool:
         """Whether the episode is over."""
-        orders = self.layout.rules.orders
-        delivered = int(self.state[ORDERS_DELIVERED])
-        return self.tick >= self.layout.rules.horizon_ticks or (
-            orders is not None and delivered >= len(orders)
-        )
+        return bool(rules.finished(self._spec, self.state))
 
     @property
     def events(self) -> tuple[Event, ...]:

@@ -45,7 +45,7 @@ class GridProblem:
 
 @dataclass(frozen=True)
 class Rules:
-    """What a layout leaves open: times in ticks, the reward of a soup, the order list (None: any soup, for ever)."""
+    """What a layout leaves open; without `orders` any soup pays, for ever."""
 
     rule_set: str = "classic"
     cook_time_ticks: int = 20
@@ -162,10 +162,8 @@ class Layout:
     @cached_property
     def starts(self) -> tuple[Place, Place]:
         """Where seat 0 and seat 1 start, as (x, y)."""
-        found = {
-            tile: (x, y) for y, row in enumerate(self.grid) for x, tile in enumerate(row) if tile in "12"
-        }
-        return found["1"], found["2"]
+        text = "".join(self.grid)
+        return self.place(text.index("1")), self.place(text.index("2"))
 
     def places(self, tile: int) -> tuple[Place, ...]:
         """All cells of one tile code as (x, y), in row-major order."""
@@ -234,37 +232,28 @@ class Layout:
 
 
 def grid_problems(grid: tuple[str, ...]) -> list[GridProblem]:
-    """Everything that keeps a drawn grid from being a kitchen, in reading order; empty when all is well."""
+    """Everything that keeps a drawn grid from being a kitchen; empty when all is well."""
     if not grid or not grid[0]:
         return [GridProblem(None, "the grid is empty", "draw at least 3 rows of tiles")]
     found: list[GridProblem] = []
     width = Counter(len(row) for row in grid).most_common(1)[0][0]
-    if len(grid) > MAX_SIDE_TILES or width > MAX_SIDE_TILES:
+    if max(len(grid), width) > MAX_SIDE_TILES:
         fix = f"use at most {MAX_SIDE_TILES} by {MAX_SIDE_TILES} tiles"
         found.append(GridProblem(None, f"the grid is {width} by {len(grid)} tiles", fix))
     known = TILE_LETTERS + "12"
-    letters = " ".join((TILE_LETTERS + "12").strip())
+    letters = " ".join(known.strip())
     for number, row in enumerate(grid):
         if len(row) != width:
-            found.append(
-                GridProblem(
-                    number, f"the row has {len(row)} tiles, the others {width}", "make all rows equally long"
-                )
-            )
+            told = f"the row has {len(row)} tiles, the others {width}"
+            found.append(GridProblem(number, told, "make all rows equally long"))
         for tile in dict.fromkeys(row):
             if tile not in known:
-                found.append(
-                    GridProblem(number, f"tile {tile!r} is unknown", f"use one of {letters} or a space")
-                )
+                told = f"tile {tile!r} is unknown"
+                found.append(GridProblem(number, told, f"use one of {letters} or a space"))
         edge = row if number in (0, len(grid) - 1) else row[:1] + row[-1:]
         if any(tile in " 12" for tile in edge):
-            found.append(
-                GridProblem(
-                    number,
-                    "the border is open: a chef could walk out",
-                    "close every edge, for instance with X",
-                )
-            )
+            told = "the border is open, a chef could walk out"
+            found.append(GridProblem(number, told, "close every edge, for instance with X"))
     for chef in "12":
         rows = [number for number, row in enumerate(grid) for tile in row if tile == chef]
         if not rows:

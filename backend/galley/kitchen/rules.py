@@ -6,7 +6,7 @@ of compiled code does not notice changes made to functions in other files.
 Source: Carroll et al. 2019 (Overcooked-AI as of that year), the rules of the COLE and LSI papers;
 checked against 91,102 recorded human transitions (`tests/kitchen/test_human_data.py`).
 """
-# mypy: disable-error-code="untyped-decorator"
+# mypy: disable-error-code="no-any-return"
 
 from __future__ import annotations
 
@@ -150,16 +150,15 @@ def _use_pot(spec: NDArray[int16], state: NDArray[int16], hand: int, slot: int) 
     pot = state[slot]
     kind = pot % POT_COUNT
     count = (pot // POT_COUNT) % POT_COUNT
-    if held == ONION or held == TOMATO:
+    if held in (ONION, TOMATO):
         if count == 0 or (kind == held and count < INGREDIENTS_PER_SOUP):
             state[slot] = held + POT_COUNT * (count + 1)
             state[hand] = NOTHING
             return 1 << (BIT_POT + held - ONION)
-    elif held == DISH:
-        if count == INGREDIENTS_PER_SOUP and pot // POT_TICKS >= spec[SPEC_COOK_TIME]:
-            state[slot] = 0
-            state[hand] = kind + SOUP_OF_KIND
-            return 1 << (BIT_FETCH + kind - ONION)
+    elif held == DISH and count == INGREDIENTS_PER_SOUP and pot // POT_TICKS >= spec[SPEC_COOK_TIME]:
+        state[slot] = 0
+        state[hand] = kind + SOUP_OF_KIND
+        return 1 << (BIT_FETCH + kind - ONION)
     return 0
 
 

@@ -36,7 +36,7 @@ class ChefView:
 
 @dataclass(frozen=True)
 class PotView:
-    """One pot: kind (0 none, 1 onion, 2 tomato), ingredients in it, cooking ticks so far, whether it is ready."""
+    """One pot: kind (0 none, 1 onion, 2 tomato), how many of them, cooking ticks so far, readiness."""
 
     kind: int = 0
     count: int = 0
@@ -46,7 +46,7 @@ class PotView:
 
 @dataclass(frozen=True)
 class KitchenView:
-    """A kitchen for reading: `things` by (x, y) of their counter, `pots` by (x, y), all of them, empty ones too."""
+    """A kitchen for reading: `things` by the (x, y) of their counter, all `pots` by (x, y), empty or not."""
 
     chefs: tuple[ChefView, ChefView]
     things: Mapping[Place, int] = field(default_factory=dict)
