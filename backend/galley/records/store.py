@@ -44,15 +44,25 @@ class Store:
 
     @classmethod
     def open(
-        cls, database: str | Path, *, serving: bool = False, flush_every_s: float = FLUSH_EVERY_S
+        cls,
+        database: str | Path,
+        *,
+        serving: bool = False,
+        must_exist: bool = False,
+        flush_every_s: float = FLUSH_EVERY_S,
     ) -> Self:
         """The store in `database` (a URL or the path of an SQLite file), made or migrated as needed.
 
-        Raises: GalleyError if it cannot be opened, is newer than this Galley, or (serving) is served already.
+        Raises: GalleyError if it cannot be opened, is newer than this Galley, does not exist though it must,
+        or is to be served and is served already.
         """
         url = database_url(database)
         file = sqlite_file(url)
         name = str(file or url.render_as_string())
+        if must_exist and file is not None and not file.is_file():
+            raise GalleyError(
+                f"{name}: there is no such database; name the one that was served with --database"
+            )
         try:
             if file is not None:
                 file.parent.mkdir(parents=True, exist_ok=True)
@@ -131,7 +141,10 @@ class Store:
         """
         items = () if questionnaire is None else questionnaire.items
         shown = {item.id: item.model_dump(mode="json") for item in items}
-        rows = [{"item": item, "value": value, "shown": shown.get(item)} for item, value in answers.items()]
+        rows = [
+            {"position": position, "item": item, "value": value, "shown": shown.get(item)}
+            for position, (item, value) in enumerate(answers.items(), 1)
+        ]
         return self._writer.submit(
             lambda connection: jobs.leave_step(
                 connection, visit_id, step_id, rows, new_step_index, status, round(at_ms), completion_code

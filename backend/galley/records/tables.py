@@ -106,6 +106,7 @@ RESPONSES = Table(
     _of("visit_id", _ROW_ID, "the visit", ForeignKey("visits.id", ondelete="CASCADE"), primary_key=True),
     _of("step_id", String(200), "step of the visit's plan", primary_key=True),
     _of("item", String(200), "item of the step's questionnaire", primary_key=True),
+    _of("position", Integer, "place of the item on its page, from 1"),
     _of("value", JSON, "the answer: a number, a text, an option, a list of options, or null if left open"),
     _of("shown", JSON, "the item as it was shown: kind, text, options or scale", nullable=True),
     _of("at_ms", BigInteger, "when the answer was stored"),

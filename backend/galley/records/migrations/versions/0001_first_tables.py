@@ -103,6 +103,7 @@ def upgrade() -> None:
         sa.Column("visit_id", sa.BigInteger().with_variant(sa.Integer(), "sqlite"), nullable=False),
         sa.Column("step_id", sa.String(length=200), nullable=False),
         sa.Column("item", sa.String(length=200), nullable=False),
+        sa.Column("position", sa.Integer(), nullable=False),
         sa.Column("value", sa.JSON(), nullable=False),
         sa.Column("shown", sa.JSON(), nullable=True),
         sa.Column("at_ms", sa.BigInteger(), nullable=False),
