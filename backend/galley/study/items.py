@@ -163,8 +163,11 @@ def item_faults(items: tuple[Any, ...]) -> list[tuple[Loc, str, str]]:
                 found.append(((place, "when", "item"), told, f"use one of {known}"))
             else:
                 found += [
-                    ((place, "when", "any_of", n), f"'{value}' is no option of '{item.when.item}'",
-                     f"use one of {' '.join(values)}")
+                    (
+                        (place, "when", "any_of", n),
+                        f"'{value}' is no option of '{item.when.item}'",
+                        f"use one of {' '.join(values)}",
+                    )
                     for n, value in enumerate(item.when.any_of)
                     if value not in values
                 ]

@@ -66,8 +66,8 @@ def validate_answers(
     `form` maps a field name to its values as sent; names that are no item are ignored. Answers have every
     item: a scale's point as int (1 is the low end), a choice as the option's value, several as a list in the
     order of the file, a number as int or float, text without blanks around it, None for what was left blank
-    or not asked. Problems map an item's id to what a participant should do. Nothing is filled in: an untouched
-    scale is a problem, never a value.
+    or not asked. Problems map an item's id to what a participant should do. Nothing is filled in: an
+    untouched scale is a problem, never a value.
     """
     answers: dict[str, Answer] = {}
     problems: dict[str, str] = {}
@@ -136,7 +136,8 @@ def _answer(item: Item, given: list[str]) -> Answer:
         case ShortText() | LongText():
             text = given[0] if isinstance(item, LongText) else " ".join(given[0].splitlines())
             if len(text) > item.max_length:
-                raise ValueError(f"Please shorten this to {item.max_length} characters; it has {len(text)} now.")
+                told = f"Please shorten this to {item.max_length} characters; it has {len(text)} now."
+                raise ValueError(told)
             return text
 
 
