@@ -27,7 +27,7 @@ POLICIES: Final[Mapping[str, tuple[Kind, frozenset[str]]]] = {
     "random": ("scripted", frozenset()),
     "myopic": ("planner", frozenset({"epsilon"})),
 }
-"""The policies of planners and scripts that `params: {policy: NAME}` may name, each with its other parameters."""
+"""What `params: {policy: NAME}` may name: the kind of agent and the other parameters of each policy."""
 
 _FILE: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 
@@ -39,7 +39,7 @@ class Description(FileModel):
     name: str
     kind: Kind
     layouts: Literal["any"] | dict[str, str]
-    params: dict[str, str | int | float | bool] = {}
+    params: dict[str, str | int | float | bool] = pydantic.Field(default_factory=dict)
     encoding: str | None = None
     sampling: Sampling | None = None
     unstuck_after_ticks: Literal["none"] | Annotated[int, pydantic.Field(ge=1, le=100)] | None = None
@@ -123,7 +123,9 @@ def _problems(loaded: Loaded[Description], folder: Path) -> list[Problem]:
         told.append(
             (("name",), f"name '{description.name}' is not that of the folder", f"write name: {folder.name}")
         )
-    told += _network_faults(description, folder) if description.kind == "network" else _policy_faults(description)
+    told += (
+        _network_faults(description, folder) if description.kind == "network" else _policy_faults(description)
+    )
     return [loaded.problem(*one) for one in told]
 
 
@@ -143,11 +145,15 @@ def _network_faults(description: Description, folder: Path) -> list[tuple[tuple[
     if description.params:
         told.append((("params",), "a network has no params", "remove the key"))
     if description.layouts == "any" or not description.layouts:
-        told.append((("layouts",), "a network needs a file for each layout", "write `layout: file.onnx` lines"))
+        told.append(
+            (("layouts",), "a network needs a file for each layout", "write `layout: file.onnx` lines")
+        )
         return told
     for layout, file in description.layouts.items():
         if not _FILE.fullmatch(file):
-            told.append((("layouts", layout), f"'{file}' is no plain file name", "put the file beside agent.yaml"))
+            told.append(
+                (("layouts", layout), f"'{file}' is no plain file name", "put the file beside agent.yaml")
+            )
         elif not (folder / file).is_file():
             fix = name_fix(file, [path.name for path in folder.glob("*.onnx")])
             told.append((("layouts", layout), f"there is no file {file}", fix))

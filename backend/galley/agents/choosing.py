@@ -21,9 +21,11 @@ def choose(
     allowed[~allowed.any(axis=1)] = True
     free = np.where(allowed, logits.astype(np.float64), -np.inf)
     if draws is None:
-        return free.argmax(axis=1)
+        best: NDArray[np.int64] = free.argmax(axis=1)
+        return best
     weights = np.exp(free - free.max(axis=1, keepdims=True))
     reached = weights.cumsum(axis=1)
     actions = (reached <= draws[:, None] * reached[:, -1:]).sum(axis=1)
     last = logits.shape[1] - 1 - allowed[:, ::-1].argmax(axis=1)
-    return np.minimum(actions, last)
+    chosen: NDArray[np.int64] = np.minimum(actions, last)
+    return chosen

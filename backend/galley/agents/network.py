@@ -112,7 +112,9 @@ class Network:
     def _fit(what: str, found: Sequence[object], wanted: tuple[int, ...]) -> None:
         shown = ["B", *wanted]
         if not found or isinstance(found[0], int):
-            raise GalleyError(f"{what} has shape {list(found)}; it must be {shown} with a dynamic batch size B")
+            raise GalleyError(
+                f"{what} has shape {list(found)}; it must be {shown} with a dynamic batch size B"
+            )
         fits = len(found) == len(wanted) + 1 and all(
             size == want or not isinstance(size, int) for size, want in zip(found[1:], wanted, strict=False)
         )
@@ -123,8 +125,8 @@ class Network:
 class NetworkAgent:
     """An agent that follows a network; `networks` gives the network and encoder for a layout.
 
-    Unstuck rule: with `unstuck_after_ticks` = N, once at least N + 1 own ticks are on record and cell and facing
-    equal those of each of the last N ticks, the actions taken in those N ticks get probability 0.
+    Unstuck rule: with `unstuck_after_ticks` = N, once at least N + 1 own ticks are on record and cell and
+    facing equal those of each of the last N ticks, the actions taken in those N ticks get probability 0.
 
     Source: the human models of Carroll et al. 2019 (arXiv:1910.05789), N = 3.
     """

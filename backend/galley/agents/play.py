@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from galley.agents.bundle import Bundle
 from galley.agents.together import act_together
@@ -45,16 +45,16 @@ def play(a: Bundle, b: Bundle, layout: Layout, games: int, seed: int) -> tuple[P
     """
     first, second = np.random.SeedSequence(seed).spawn(2)
     return (
-        play_in_seats((a, b), layout, first.generate_state(games, np.uint64)),
-        play_in_seats((b, a), layout, second.generate_state(games, np.uint64)),
+        play_in_seats((a, b), layout, first.generate_state(games, np.uint64).tolist()),
+        play_in_seats((b, a), layout, second.generate_state(games, np.uint64).tolist()),
     )
 
 
-def play_in_seats(seats: tuple[Bundle, Bundle], layout: Layout, seeds: NDArray[np.uint64]) -> PlayResult:
-    """The result of one game per seed (uint64 [B]), all played side by side to their ends."""
+def play_in_seats(seats: tuple[Bundle, Bundle], layout: Layout, seeds: Sequence[int]) -> PlayResult:
+    """The result of one game per seed, all played side by side to their ends."""
     kitchens = KitchenBatch(layout, len(seeds))
     agents = [(seats[0].make(), seats[1].make()) for _ in seeds]
-    for pair, seed in zip(agents, seeds.tolist(), strict=True):
+    for pair, seed in zip(agents, seeds, strict=True):
         for seat, agent in enumerate(pair):
             agent.reset(layout, seat, seed)
     everyone = [agent for pair in agents for agent in pair]

@@ -13,8 +13,8 @@ from galley.kitchen import Layout
 class Agent(Protocol):
     """Someone who acts for one seat of one kitchen.
 
-    An agent is a function of its layout, seat, seed and what it has observed: `act` changes nothing, so asking
-    twice gives one answer, and an agent that is reset and shown the same ticks again acts the same from there.
+    An agent is a function of its layout, seat, seed and what it has observed: `act` changes nothing, so
+    asking twice gives one answer, and one that is reset and shown the same ticks again acts the same.
     """
 
     def reset(self, layout: Layout, seat: int, seed: int) -> None:
@@ -29,4 +29,3 @@ class Agent(Protocol):
 
     def observe(self, state: NDArray[int16], joint_action: tuple[int, int]) -> None:
         """Take note of what both chefs did in `state`, the state before the joint action."""
-

@@ -28,7 +28,9 @@ def act_together(
     for members in groups.values():
         places = [place for place, _ in members]
         found = act_as_one(
-            [agent for _, agent in members], [states[place] for place in places], [ticks[place] for place in places]
+            [agent for _, agent in members],
+            [states[place] for place in places],
+            [ticks[place] for place in places],
         )
         for place, action in zip(places, found, strict=True):
             actions[place] = action

@@ -19,9 +19,9 @@ MOST_CELLS = 1600
 class Distances:
     """Distances of one layout; poses P = H*W*4 as `cell * 4 + facing`, cells H*W as `y * W + x`.
 
-    `costs` int16[P, H*W]: fewest actions from a pose until the chef faces a tile, the other chef left out of
-    account; -1 for floor and for tiles it can never face. `reachable` bool[2, H*W]: the tiles that the chef of
-    each seat can ever face from its start.
+    `costs` int16[P, H*W]: fewest actions from a pose until the chef faces a tile, the other chef left out
+    of account; -1 for floor and for tiles it can never face. `reachable` bool[2, H*W]: the tiles that the
+    chef of each seat can ever face from its start.
     """
 
     layout: Layout

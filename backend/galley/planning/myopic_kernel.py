@@ -1,0 +1,440 @@
+"""The myopic human's decision, compiled: one kernel. `myopic.py` says what it does and why."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy import bool_, int16
+from numpy.typing import NDArray
+
+from galley.kitchen.codes import (
+    CELL,
+    CELLS,
+    CHEF,
+    COUNTER,
+    DISH,
+    DISH_DISPENSER,
+    FACING,
+    FLOOR,
+    HELD,
+    INGREDIENTS_PER_SOUP,
+    INTERACT,
+    NOTHING,
+    ONION,
+    ONION_DISPENSER,
+    ORDERS_DELIVERED,
+    POT,
+    POT_COUNT,
+    POT_TICKS,
+    SERVING,
+    SOUP_OF_KIND,
+    SPEC_COOK_TIME,
+    SPEC_HEIGHT,
+    SPEC_ORDERS,
+    SPEC_POTS,
+    SPEC_TILES,
+    SPEC_WIDTH,
+    STAY,
+    TOMATO,
+    TOMATO_DISPENSER,
+)
+
+# What the chef remembers of the tick before, int16 [MEMORY_SIZE].
+KNOWN = 0
+OWN_CELL = 1
+OWN_FACING = 2
+OWN_ACTION = 3
+OTHER_CELL = 4
+OTHER_ACTION = 5
+WANDERS = 6  # random moves still to make, once stuck
+MEMORY_SIZE = 7
+
+NOWHERE = -1
+
+
+@njit(cache=True)
+def _tile(spec: NDArray[int16], cell: int) -> int:
+    return int(spec[SPEC_TILES + cell])
+
+
+@njit(cache=True)
+def _dispenser_of(thing: int) -> int:
+    """The tile that gives an ingredient or a dish."""
+    if thing == DISH:
+        return DISH_DISPENSER
+    return ONION_DISPENSER if thing == ONION else TOMATO_DISPENSER
+
+
+@njit(cache=True)
+def _reaches(spec: NDArray[int16], reach: NDArray[bool_], seat: int, tile: int) -> bool:
+    """Whether a seat can face some tile of this code."""
+    tiles = spec[SPEC_TILES : SPEC_TILES + reach.shape[1]]
+    return bool(np.any(reach[seat] & (tiles == tile)))
+
+
+@njit(cache=True)
+def _lying(state: NDArray[int16], spec: NDArray[int16], reach: NDArray[bool_], seat: int, thing: int) -> int:
+    """How many of a thing lie on counters that a seat can reach."""
+    count = 0
+    for cell in range(reach.shape[1]):
+        if reach[seat, cell] and _tile(spec, cell) == COUNTER and state[CELLS + cell] == thing:
+            count += 1
+    return count
+
+
+@njit(cache=True)
+def _open_order(spec: NDArray[int16], state: NDArray[int16], ahead: int) -> int:
+    """The ingredient of the order `ahead` places behind the first open one; NOTHING beyond the list's end."""
+    place = state[ORDERS_DELIVERED] + ahead
+    if place >= spec[SPEC_ORDERS]:
+        return NOTHING
+    return int(spec[SPEC_TILES + spec[SPEC_WIDTH] * spec[SPEC_HEIGHT] + spec[SPEC_POTS] + place])
+
+
+@njit(cache=True)
+def _wanted(spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_]) -> int:
+    """The ingredient of the next soup to begin: that of the first open order that no soup answers yet."""
+    if spec[SPEC_ORDERS] == 0:
+        onions = _reaches(spec, reach, 0, ONION_DISPENSER) or _reaches(spec, reach, 1, ONION_DISPENSER)
+        return ONION if onions else TOMATO
+    soups = np.zeros(3, dtype=np.int16)
+    for cell in range(reach.shape[1]):
+        held = state[CELLS + cell]
+        if _tile(spec, cell) == POT:
+            soups[held % POT_COUNT] += 1
+        elif _tile(spec, cell) == COUNTER and held > SOUP_OF_KIND:
+            soups[held - SOUP_OF_KIND] += 1
+    for seat in range(2):
+        held = state[CHEF * seat + HELD]
+        if held > SOUP_OF_KIND:
+            soups[held - SOUP_OF_KIND] += 1
+    ahead = 0
+    kind = _open_order(spec, state, ahead)
+    while kind != NOTHING and soups[kind] > 0:
+        soups[kind] -= 1
+        ahead += 1
+        kind = _open_order(spec, state, ahead)
+    return kind
+
+
+@njit(cache=True)
+def _room(packed: int, wanted: int, ingredient: int, any_order: bool) -> int:
+    """How many of an ingredient a pot can take, 0 if it should get none."""
+    count = packed // POT_COUNT % POT_COUNT
+    kind = packed % POT_COUNT
+    if count == 0:
+        return INGREDIENTS_PER_SOUP if any_order or ingredient == wanted else 0
+    return INGREDIENTS_PER_SOUP - count if kind == ingredient else 0
+
+
+@njit(cache=True)
+def _need(
+    spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], seat: int, thing: int, wanted: int,
+    not_for: int,
+) -> int:  # fmt: skip
+    """How many of a thing the pots call for that `seat` reaches and seat `not_for` (-1: none) does not."""
+    need = 0
+    for cell in range(reach.shape[1]):
+        if _tile(spec, cell) != POT or not reach[seat, cell] or (not_for >= 0 and reach[not_for, cell]):
+            continue
+        packed = state[CELLS + cell]
+        if thing == DISH:
+            need += packed // POT_COUNT % POT_COUNT == INGREDIENTS_PER_SOUP
+        else:
+            need += _room(packed, wanted, thing, False)
+    return need
+
+
+@njit(cache=True)
+def _to_pass(
+    spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], seat: int, thing: int, wanted: int
+) -> bool:
+    """Whether the other chef needs a thing that only this one can get, beyond what it holds or finds."""
+    other = 1 - seat
+    need = _need(spec, state, reach, other, thing, wanted, seat)
+    if need == 0 or _reaches(spec, reach, other, _dispenser_of(thing)):
+        return False
+    return bool(need > _lying(state, spec, reach, other, thing) + (state[CHEF * other + HELD] == thing))
+
+
+@njit(cache=True)
+def _free_counter(
+    spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], costs: NDArray[int16], seat: int,
+    shared: bool,
+) -> int:  # fmt: skip
+    """The nearest empty counter, one that the other chef reaches too or one that it does not."""
+    best = NOWHERE
+    for cell in range(reach.shape[1]):
+        if _tile(spec, cell) != COUNTER or state[CELLS + cell] != NOTHING or costs[cell] < 0:
+            continue
+        if reach[1 - seat, cell] == shared and (best == NOWHERE or costs[cell] < costs[best]):
+            best = cell
+    return best
+
+
+@njit(cache=True)
+def _source(
+    spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], costs: NDArray[int16], seat: int,
+    thing: int, unshared: bool,
+) -> int:  # fmt: skip
+    """The nearest place to get a thing; with `unshared`, not from a counter that the other chef reaches."""
+    best = NOWHERE
+    for cell in range(reach.shape[1]):
+        if costs[cell] < 0:
+            continue
+        tile = _tile(spec, cell)
+        gives = tile == COUNTER and state[CELLS + cell] == thing and not (unshared and reach[1 - seat, cell])
+        if thing <= DISH:
+            gives = gives or tile == _dispenser_of(thing)
+        if gives and (best == NOWHERE or costs[cell] < costs[best]):
+            best = cell
+    return best
+
+
+@njit(cache=True)
+def _nearest(spec: NDArray[int16], costs: NDArray[int16], tile: int) -> int:
+    """The nearest tile of a code."""
+    best = NOWHERE
+    for cell in range(costs.size):
+        if costs[cell] >= 0 and _tile(spec, cell) == tile and (best == NOWHERE or costs[cell] < costs[best]):
+            best = cell
+    return best
+
+
+@njit(cache=True)
+def _drop(
+    spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], costs: NDArray[int16], seat: int
+) -> int:
+    """Where to put a thing of no use: the nearest empty counter, an unshared one if chefs are apart."""
+    apart = _free_counter(spec, state, reach, costs, seat, False)
+    shared = _free_counter(spec, state, reach, costs, seat, True)
+    if apart == NOWHERE or shared == NOWHERE:
+        return max(apart, shared)
+    if _together(reach) and costs[shared] < costs[apart]:
+        return shared
+    return apart
+
+
+@njit(cache=True)
+def _together(reach: NDArray[bool_]) -> bool:
+    """Whether both chefs reach the same tiles."""
+    return bool(np.all(reach[0] == reach[1]))
+
+
+@njit(cache=True)
+def _empty_handed(
+    spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], costs: NDArray[int16], seat: int,
+    wanted: int,
+) -> int:  # fmt: skip
+    """Where a chef who holds nothing should interact."""
+    other = 1 - seat
+    serves = _reaches(spec, reach, seat, SERVING)
+    for kind in (ONION, TOMATO):
+        ordered = spec[SPEC_ORDERS] == 0 or _open_order(spec, state, 0) == kind
+        if ordered and (serves or _reaches(spec, reach, other, SERVING)):
+            soup = _source(spec, state, reach, costs, seat, kind + SOUP_OF_KIND, not serves)
+            if soup != NOWHERE:
+                return soup
+    room = _free_counter(spec, state, reach, costs, seat, True) != NOWHERE
+    on_its_way = state[CHEF * other + HELD] == DISH
+    if _need(spec, state, reach, seat, DISH, wanted, -1) > on_its_way:
+        dish = _source(spec, state, reach, costs, seat, DISH, False)
+        if dish != NOWHERE:
+            return dish
+    if room and _to_pass(spec, state, reach, seat, DISH, wanted):
+        dish = _source(spec, state, reach, costs, seat, DISH, True)
+        if dish != NOWHERE:
+            return dish
+    best = NOWHERE
+    for kind in (ONION, TOMATO):
+        own = _need(spec, state, reach, seat, kind, wanted, -1) > 0
+        if own or (room and _to_pass(spec, state, reach, seat, kind, wanted)):
+            found = _source(spec, state, reach, costs, seat, kind, not own)
+            if found != NOWHERE and (best == NOWHERE or costs[found] < costs[best]):
+                best = found
+    if best != NOWHERE or room or _together(reach):
+        return best
+    # Nothing to do, and no shared counter free to get what is missing: clear one of the other's things away.
+    if _free_counter(spec, state, reach, costs, seat, False) == NOWHERE:
+        return NOWHERE
+    for thing in (ONION, TOMATO, DISH):
+        if not _reaches(spec, reach, seat, _dispenser_of(thing)):
+            found = _source(spec, state, reach, costs, seat, thing, False)
+            if found != NOWHERE and reach[other, found]:
+                return found
+    return NOWHERE
+
+
+@njit(cache=True)
+def _holding_ingredient(
+    spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], costs: NDArray[int16], seat: int,
+    wanted: int,
+) -> int:  # fmt: skip
+    """Where a chef who holds an onion or a tomato should interact."""
+    held = state[CHEF * seat + HELD]
+    best = NOWHERE
+    for cell in range(costs.size):
+        if costs[cell] < 0 or _tile(spec, cell) != POT:
+            continue
+        room = _room(state[CELLS + cell], wanted, held, spec[SPEC_ORDERS] == 0)
+        if room > 0 and (best == NOWHERE or costs[cell] < costs[best]):
+            best = cell
+    if best != NOWHERE:
+        return best
+    if _to_pass(spec, state, reach, seat, held, wanted):
+        return _free_counter(spec, state, reach, costs, seat, True)
+    return _drop(spec, state, reach, costs, seat)
+
+
+@njit(cache=True)
+def _holding_dish(
+    spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], costs: NDArray[int16], seat: int,
+    wanted: int,
+) -> int:  # fmt: skip
+    """Where a chef who holds a dish should interact: the pot where it has a soup soonest."""
+    best = NOWHERE
+    soonest = 0
+    for cell in range(costs.size):
+        packed = state[CELLS + cell]
+        if costs[cell] < 0 or _tile(spec, cell) != POT:
+            continue
+        if packed // POT_COUNT % POT_COUNT == INGREDIENTS_PER_SOUP:
+            soon = max(costs[cell], spec[SPEC_COOK_TIME] - packed // POT_TICKS)
+            if best == NOWHERE or soon < soonest:
+                best, soonest = cell, soon
+    if best != NOWHERE:
+        return best
+    if _to_pass(spec, state, reach, seat, DISH, wanted):
+        return _free_counter(spec, state, reach, costs, seat, True)
+    return _drop(spec, state, reach, costs, seat)
+
+
+@njit(cache=True)
+def _holding_soup(
+    spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], costs: NDArray[int16], seat: int
+) -> int:
+    """Where a chef who holds a soup should interact; a soup that is ordered later is put down until then."""
+    kind = state[CHEF * seat + HELD] - SOUP_OF_KIND
+    if spec[SPEC_ORDERS] > 0 and _open_order(spec, state, 0) != kind:
+        for ahead in range(1, spec[SPEC_ORDERS]):
+            if _open_order(spec, state, ahead) == kind:
+                return _drop(spec, state, reach, costs, seat)
+    serving = _nearest(spec, costs, SERVING)
+    if serving != NOWHERE or not _reaches(spec, reach, 1 - seat, SERVING):
+        return serving
+    return _free_counter(spec, state, reach, costs, seat, True)
+
+
+@njit(cache=True)
+def target(
+    spec: NDArray[int16], all_costs: NDArray[int16], reach: NDArray[bool_], state: NDArray[int16], seat: int
+) -> int:
+    """The cell of the tile that the chef's subtask is at, or NOWHERE when there is nothing to do."""
+    chef = CHEF * seat
+    costs = all_costs[state[chef + CELL] * 4 + state[chef + FACING]]
+    held = state[chef + HELD]
+    wanted = _wanted(spec, state, reach)
+    if held == NOTHING:
+        return _empty_handed(spec, state, reach, costs, seat, wanted)
+    if held == DISH:
+        return _holding_dish(spec, state, reach, costs, seat, wanted)
+    if held < DISH:
+        return _holding_ingredient(spec, state, reach, costs, seat, wanted)
+    return _holding_soup(spec, state, reach, costs, seat)
+
+
+@njit(cache=True)
+def _planned(
+    spec: NDArray[int16], all_costs: NDArray[int16], reach: NDArray[bool_], state: NDArray[int16], seat: int
+) -> int:
+    """The first action of a shortest way to the subtask, the first of equals; to stay when there is none."""
+    goal = target(spec, all_costs, reach, state, seat)
+    if goal == NOWHERE:
+        return STAY
+    cell = state[CHEF * seat + CELL]
+    cost = all_costs[cell * 4 + state[CHEF * seat + FACING], goal]
+    if cost == 0:
+        packed = state[CELLS + goal]
+        cooks = packed // POT_COUNT % POT_COUNT == INGREDIENTS_PER_SOUP
+        if _tile(spec, goal) == POT and cooks and packed // POT_TICKS < spec[SPEC_COOK_TIME]:
+            return STAY
+        return INTERACT
+    for action in range(STAY):
+        ahead = _ahead(spec, cell, action)
+        ends = ahead if _tile(spec, ahead) == FLOOR else cell
+        if all_costs[ends * 4 + action, goal] == cost - 1:
+            return action
+    return STAY
+
+
+@njit(cache=True)
+def _ahead(spec: NDArray[int16], cell: int, facing: int) -> int:
+    width = spec[SPEC_WIDTH]
+    if facing < 2:
+        return int(cell - width if facing == 0 else cell + width)
+    return cell + 1 if facing == 2 else cell - 1
+
+
+@njit(cache=True)
+def stuck(state: NDArray[int16], seat: int, memory: NDArray[int16]) -> bool:
+    """Whether the chef's last move changed neither its cell nor its facing."""
+    chef = CHEF * seat
+    tried = memory[KNOWN] and memory[OWN_ACTION] < STAY
+    same = state[chef + CELL] == memory[OWN_CELL] and state[chef + FACING] == memory[OWN_FACING]
+    return bool(tried and same)
+
+
+@njit(cache=True)
+def _in_the_way(spec: NDArray[int16], state: NDArray[int16], seat: int, memory: NDArray[int16]) -> bool:
+    """Whether the other chef's last move failed because this one stood there."""
+    other = state[CHEF * (1 - seat) + CELL]
+    asked = memory[OTHER_ACTION]
+    if not memory[KNOWN] or asked >= STAY or other != memory[OTHER_CELL]:
+        return False
+    return bool(_ahead(spec, other, asked) == state[CHEF * seat + CELL])
+
+
+@njit(cache=True)
+def _wander(spec: NDArray[int16], state: NDArray[int16], seat: int, back: int, draw: float) -> int:
+    """A random move to a free cell, `back` only if there is no other; NOWHERE if there is none."""
+    cell = state[CHEF * seat + CELL]
+    other = state[CHEF * (1 - seat) + CELL]
+    free = 0
+    back_is_free = False
+    for move in range(STAY):
+        ahead = _ahead(spec, cell, move)
+        if _tile(spec, ahead) == FLOOR and ahead != other:
+            free += move != back
+            back_is_free = back_is_free or move == back
+    if free == 0:
+        return back if back_is_free else NOWHERE
+    left = int(draw * free)
+    for move in range(STAY):
+        ahead = _ahead(spec, cell, move)
+        if move != back and _tile(spec, ahead) == FLOOR and ahead != other:
+            if left == 0:
+                return move
+            left -= 1
+    return NOWHERE
+
+
+@njit(cache=True)
+def decide(
+    spec: NDArray[int16], all_costs: NDArray[int16], reach: NDArray[bool_], state: NDArray[int16], seat: int,
+    memory: NDArray[int16], draw: float,
+) -> int:  # fmt: skip
+    """The action of the myopic human on `seat`; `draw` in [0, 1) settles a random move."""
+    action = _planned(spec, all_costs, reach, state, seat)
+    if action == INTERACT:
+        return action
+    back = NOWHERE
+    if action < STAY:
+        if not stuck(state, seat, memory):
+            if memory[WANDERS] == 0:
+                return action
+            if memory[OWN_ACTION] < STAY:
+                back = memory[OWN_ACTION] ^ 1  # the codes of opposite moves differ in the last bit
+    elif not _in_the_way(spec, state, seat, memory):
+        return action
+    move = _wander(spec, state, seat, back, draw)
+    return action if move == NOWHERE else move
