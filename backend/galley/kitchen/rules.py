@@ -78,12 +78,18 @@ def reset(spec: NDArray[int16], state: NDArray[int16]) -> None:
 
 
 @njit(cache=True)
+def _all_delivered(spec: NDArray[int16], state: NDArray[int16]) -> bool:
+    """Whether there is an order list and every order of it is delivered."""
+    orders = spec[SPEC_ORDERS]
+    return bool(orders > 0 and state[ORDERS_DELIVERED] >= orders)
+
+
+@njit(cache=True)
 def finished(spec: NDArray[int16], state: NDArray[int16]) -> bool:
     """Whether the episode is over: at the horizon, or when every order of the list is delivered."""
     if state[TICK] >= spec[SPEC_HORIZON]:
         return True
-    orders = spec[SPEC_ORDERS]
-    return bool(orders > 0 and state[ORDERS_DELIVERED] >= orders)
+    return _all_delivered(spec, state)
 
 
 @njit(cache=True)
@@ -133,8 +139,6 @@ def _deliver(spec: NDArray[int16], state: NDArray[int16], soup: int) -> bool:
     orders = spec[SPEC_ORDERS]
     if orders > 0:
         done = state[ORDERS_DELIVERED]
-        if done >= orders:
-            return False
         first = SPEC_TILES + spec[SPEC_WIDTH] * spec[SPEC_HEIGHT] + spec[SPEC_POTS]
         if spec[first + done] + SOUP_OF_KIND != soup:
             return False
@@ -222,12 +226,13 @@ def step(spec: NDArray[int16], state: NDArray[int16], a0: int, a1: int, out: NDA
     events0 = 0
     events1 = 0
 
-    # 1. Interactions, seat 0 first, each on the tile faced before anyone moves.
+    # 1. Interactions, seat 0 first, each on the tile faced before anyone moves. Once the last order is
+    # delivered no more of them count.
     if a0 == INTERACT or a1 == INTERACT:
         pots_in_use = _pots_in_use(spec, state)
         if a0 == INTERACT:
             events0 = _interact(spec, state, 0, pots_in_use)
-        if a1 == INTERACT:
+        if a1 == INTERACT and not _all_delivered(spec, state):
             events1 = _interact(spec, state, CHEF, pots_in_use)
 
     # 2. Movement, both at once: turn in any case, go where there is floor and no one else.
