@@ -12,14 +12,21 @@ from galley.kitchen.codes import (
     CELL,
     CELLS,
     CHEF,
+    COUNTER,
     DELIVERIES,
     FACING,
+    FLOOR,
     HELD,
     INGREDIENTS_PER_SOUP,
+    ONION,
     ORDERS_DELIVERED,
+    POT,
     POT_COUNT,
     POT_TICKS,
+    STAY,
+    THINGS,
     TICK,
+    TOMATO,
 )
 from galley.kitchen.layout import Layout, Place
 
@@ -110,3 +117,32 @@ def from_view(layout: Layout, seen: KitchenView) -> NDArray[np.int16]:
     for place, pot in seen.pots.items():
         state[CELLS + layout.cell(place)] = pack_pot(pot.kind, pot.count, pot.ticks)
     return state
+
+
+def state_problem(layout: Layout, state: NDArray[np.int16]) -> str | None:
+    """Why `state` cannot be a state of this layout, or None; for states that come from outside."""
+    if state.shape != (state_size(layout),) or state.dtype != np.int16:
+        return f"it must be int16 [{state_size(layout)}], not {state.dtype} {list(state.shape)}"
+    row = state.tolist()
+    tiles = layout.tiles.ravel().tolist()
+    for seat, at in enumerate((0, CHEF)):
+        cell, facing, held = row[at : at + CHEF]
+        on_floor = 0 <= cell < len(tiles) and tiles[cell] == FLOOR
+        if not (on_floor and 0 <= facing < STAY and 0 <= held < len(THINGS)):
+            return f"chef {seat} has cell, facing, held thing {cell}, {facing}, {held}"
+    if row[CELL] == row[CHEF + CELL]:
+        return "both chefs are in one cell"
+    orders = len(layout.rules.orders or ())
+    if row[TICK] < 0 or row[DELIVERIES] < 0 or not 0 <= row[ORDERS_DELIVERED] <= orders:
+        return f"tick, orders delivered, deliveries are {row[TICK:CELLS]}"
+    for cell, (tile, number) in enumerate(zip(tiles, row[CELLS:], strict=True)):
+        kind, count, ticks = unpack_pot(number)
+        fits = number == 0
+        if tile == COUNTER:
+            fits = 0 <= number < len(THINGS)
+        elif tile == POT and number > 0:
+            full = count == INGREDIENTS_PER_SOUP
+            fits = kind in (ONION, TOMATO) and count > 0 and 0 <= ticks <= full * layout.rules.cook_time_ticks
+        if not fits:
+            return f"cell {cell} holds {number}"
+    return None
