@@ -1,4 +1,4 @@
-"""One clock for a serving process: monotonic seconds for deadlines, the same instants as ms since 1970 for records."""
+"""One clock for a serving process: monotonic seconds for deadlines, and as ms since 1970 for records."""
 
 from __future__ import annotations
 
@@ -36,6 +36,6 @@ class Stagger:
 
 
 def first_deadline(earliest_s: float, phase: float, tick_s: float) -> float:
-    """The first instant not before `earliest_s` that lies `phase` of a tick after a whole multiple of `tick_s`."""
+    """The first instant from `earliest_s` on that lies `phase` of a tick after a multiple of `tick_s`."""
     whole = -(-(earliest_s / tick_s - phase) // 1)
     return (whole + phase) * tick_s

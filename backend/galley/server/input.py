@@ -28,9 +28,10 @@ class _Press:
 class KeyState:
     """The keys of one chef: `press` and `let_go` as they happen, `take` once a tick.
 
-    Every press acts at least once, in the order pressed, also when it was shorter than a tick. Interact acts once
-    a press however long it is held. A held direction repeats each tick; of several the latest pressed wins.
-    At most MAX_WAITING presses wait for their tick; more are forgotten, so that hammering a key cannot run ahead.
+    Every press acts at least once, in the order pressed, also when it was shorter than a tick. Interact acts
+    once a press however long it is held. A held direction repeats each tick; of several the latest pressed
+    wins. At most MAX_WAITING presses wait for their tick; more are forgotten, so that hammering a key cannot
+    run ahead.
     """
 
     def __init__(self) -> None:
@@ -86,5 +87,5 @@ class KeyState:
 
     @staticmethod
     def _outdone(first: _Press, second: _Press) -> bool:
-        """True for a direction still held when the next one was pressed: the latest wins, the first may repeat later."""
+        """True for a direction still held when the next was pressed: the latest one wins."""
         return first.held and first.key != "interact" and second.key != "interact"

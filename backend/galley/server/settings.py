@@ -1,4 +1,4 @@
-"""The server's settings: one table that the command line, the environment, docs/settings.md and the code share."""
+"""The server's settings: one table for the command line, the environment, docs/settings.md and the code."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from galley.errors import GalleyError
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """One row: the field of Settings, the environment variable, what it is for, and its bounds when a number."""
+    """One row: field of Settings, environment variable, what it is for, and bounds when it is a number."""
 
     name: str
     env: str
@@ -25,9 +25,21 @@ SETTINGS: tuple[Setting, ...] = (
     Setting("port", "PORT", "Port to listen on; 0 takes any free one.", 0, 65535),
     Setting("database", "DATABASE", "Database URL; empty means galley.db (SQLite) in the workspace."),
     Setting("study", "STUDY", "The one study to serve; empty serves all of the workspace."),
-    Setting("think_window_ms", "THINK_WINDOW_MS", "How long agents' decisions are gathered into a batch, ms.", 0, 50),
+    Setting(
+        "think_window_ms",
+        "THINK_WINDOW_MS",
+        "How long agents' decisions are gathered into a batch, ms.",
+        0,
+        50,
+    ),
     Setting("max_form_kib", "MAX_FORM_KIB", "Largest form that is read, KiB.", 1, 10_240),
-    Setting("messages_per_s", "MESSAGES_PER_S", "Websocket messages a second that one connection may keep up.", 10, 10_000),
+    Setting(
+        "messages_per_s",
+        "MESSAGES_PER_S",
+        "Websocket messages a second that one connection may keep up.",
+        10,
+        10_000,
+    ),
     Setting("log_level", "LOG_LEVEL", "How much is logged: error, warning, info or debug."),
 )
 LOG_LEVELS = ("error", "warning", "info", "debug")
@@ -76,7 +88,9 @@ def _checked(setting: Setting, origin: str, value: Any) -> str | int:
     except ValueError:
         number = setting.low - 1
     if not setting.low <= number <= setting.high:
-        raise GalleyError(f"{origin}: '{value}' is not possible; use a whole number from {setting.low} to {setting.high}")
+        raise GalleyError(
+            f"{origin}: '{value}' is not possible; use a whole number from {setting.low} to {setting.high}"
+        )
     return number
 
 

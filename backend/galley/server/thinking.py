@@ -39,7 +39,11 @@ class Question:
     __slots__ = ("answer", "asked_s", "mind", "seen", "state", "tick")
 
     def __init__(
-        self, mind: Mind, tick: int, state: NDArray[np.int16], seen: tuple[NDArray[np.int16], tuple[int, int]] | None
+        self,
+        mind: Mind,
+        tick: int,
+        state: NDArray[np.int16],
+        seen: tuple[NDArray[np.int16], tuple[int, int]] | None,
     ) -> None:
         self.mind = mind
         self.tick = tick
@@ -64,8 +68,9 @@ class Mind:
     ) -> Question:
         """Ask for the action at `tick` in `state` (int16 [S], not changed afterwards); returns at once.
 
-        `seen` is the state before and the joint action that led here, shown to the agent first; None at the start
-        and when the agent has been shown it already. A question that is overtaken by the next is never answered.
+        `seen` is the state before and the joint action that led here, shown to the agent first; None at the
+        start and when the agent has been shown it already. A question that is overtaken by the next is never
+        answered.
         """
         question = Question(self, tick, state, seen)
         self.newest = question

@@ -1,4 +1,4 @@
-"""The messages between the browser and a round: one table that parsing, docs/protocol.md and the tests read."""
+"""The messages between browser and round: one table that parsing, docs/protocol.md and the tests read."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ MAX_MESSAGE_CHARS = 1024
 KEYS = ("up", "down", "left", "right", "interact")
 RELEASE_REASONS = ("blur", "hidden", "pagehide")
 PHASES = ("waiting", "countdown", "playing", "paused", "ended")
-OUTCOMES = ("finished", "abandoned")
+OUTCOMES = ("finished", "abandoned", "skipped")
 CLOSE_REPLACED = 4001
 CLOSE_ENDED = 4002
 CLOSE_REFUSED = 4003
 
 
-class BadMessage(ValueError):
+class MessageError(ValueError):
     """A message from the browser that cannot be used; the text is the reason the sender is given."""
 
 
@@ -47,7 +47,9 @@ CHECKS: Mapping[str, Callable[[object], bool]] = {
     "number": _number,
     "true or false": lambda value: isinstance(value, bool),
     "0 or 1": lambda value: type(value) is int and value in (0, 1),
-    "short text": lambda value: isinstance(value, str) and re.fullmatch(r"[\x20-\x7e]{1,64}", value) is not None,
+    "short text": lambda value: (
+        isinstance(value, str) and re.fullmatch(r"[\x20-\x7e]{1,64}", value) is not None
+    ),
     "text": lambda value: isinstance(value, str),
     "list": _list,
     "key": _one_of(*KEYS),
@@ -65,7 +67,7 @@ CHOICES: Mapping[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """One field of a message: its name, its kind (a key of CHECKS, perhaps with " or null") and what it says."""
+    """One field of a message: name, kind (a key of CHECKS, perhaps with " or null") and what it says."""
 
     name: str
     kind: str
@@ -99,7 +101,9 @@ MESSAGES: tuple[Message, ...] = (
             Field("tab", "short text", "a random name made at each page load: two tabs have two names"),
         ),
     ),
-    Message("ready", "client", "The participant pressed Start, or is back after a pause: the countdown begins."),
+    Message(
+        "ready", "client", "The participant pressed Start, or is back after a pause: the countdown begins."
+    ),
     Message(
         "key",
         "client",
@@ -107,7 +111,11 @@ MESSAGES: tuple[Message, ...] = (
         (
             Field("key", "key", "which key"),
             Field("down", "true or false", "true when pressed, false when let go"),
-            Field("seq", "whole number", "grows by one or more with every key and release message of a connection"),
+            Field(
+                "seq",
+                "whole number",
+                "grows by one or more with every key and release message of a connection",
+            ),
             Field("client_ms", "number", "the browser's clock when it happened, ms"),
         ),
     ),
@@ -141,7 +149,11 @@ MESSAGES: tuple[Message, ...] = (
             Field("tick_ms", "whole number", "length of a tick, ms"),
             Field("seat", "0 or 1", "the participant's seat"),
             Field("hats", "list", "hat colours of seat 0 and seat 1"),
-            Field("grid", "list", "one text a row: X counter, P pot, O onions, T tomatoes, D dishes, S serving, space floor"),
+            Field(
+                "grid",
+                "list",
+                "one text a row: X counter, P pot, O onions, T tomatoes, D dishes, S serving, space floor",
+            ),
             Field("cook_time", "whole number", "ticks a soup cooks"),
             Field("chefs", "list", "seat 0 and seat 1 as [x, y, facing, held]"),
             Field("things", "list", "things lying on counters as [x, y, thing]"),
@@ -187,7 +199,11 @@ MESSAGES: tuple[Message, ...] = (
         "server",
         "The round is over and stored.",
         (
-            Field("outcome", "outcome", "finished: every tick was played; abandoned: the pause was too long"),
+            Field(
+                "outcome",
+                "outcome",
+                "finished: played to its end; abandoned: paused too long; skipped: a practice left out",
+            ),
             Field("score", "whole number", "points"),
             Field("next", "text", "the page to go on to"),
         ),
@@ -201,7 +217,11 @@ MESSAGES: tuple[Message, ...] = (
             Field("server_ms", "number", "the server's clock, ms since 1970"),
         ),
     ),
-    Message("elsewhere", "server", "The round was opened in another tab, which has it now; this connection closes."),
+    Message(
+        "elsewhere",
+        "server",
+        "The round was opened in another tab, which has it now; this connection closes.",
+    ),
     Message(
         "refused",
         "server",
@@ -266,30 +286,32 @@ _CLASSES: Mapping[str, Callable[..., Incoming]] = {
 def parse(frame: str | bytes) -> Incoming:
     """The message in one frame from a browser.
 
-    Raises: BadMessage with the reason when it is none of the table's, or not as the table says.
+    Raises: MessageError with the reason when it is none of the table's, or not as the table says.
     """
     if isinstance(frame, bytes):
-        raise BadMessage("messages are text, not binary")
+        raise MessageError("messages are text, not binary")
     if len(frame) > MAX_MESSAGE_CHARS:
-        raise BadMessage(f"messages have at most {MAX_MESSAGE_CHARS} characters, this one {len(frame)}")
+        raise MessageError(f"messages have at most {MAX_MESSAGE_CHARS} characters, this one {len(frame)}")
     try:
         content = orjson.loads(frame)
     except (orjson.JSONDecodeError, UnicodeEncodeError) as error:
-        raise BadMessage("messages are JSON") from error
+        raise MessageError("messages are JSON") from error
     if not isinstance(content, dict):
-        raise BadMessage("messages are JSON objects")
+        raise MessageError("messages are JSON objects")
     name = content.pop("type", None)
     message = CLIENT.get(name) if isinstance(name, str) else None
     if message is None:
-        raise BadMessage(f"type is one of {', '.join(CLIENT)}")
+        raise MessageError(f"type is one of {', '.join(CLIENT)}")
     for field in message.fields:
         if field.name not in content:
-            raise BadMessage(f"{message.name} lacks {field.name}")
+            raise MessageError(f"{message.name} lacks {field.name}")
         if not field.holds(content[field.name]):
             allowed = CHOICES.get(field.kind)
-            raise BadMessage(f"{field.name} is {'one of ' + ', '.join(allowed) if allowed else 'a ' + field.kind}")
+            raise MessageError(
+                f"{field.name} is {'one of ' + ', '.join(allowed) if allowed else 'a ' + field.kind}"
+            )
     if len(content) != len(message.fields):
-        raise BadMessage(f"{message.name} has fields it should not have")
+        raise MessageError(f"{message.name} has fields it should not have")
     return _CLASSES[message.name](**content)
 
 

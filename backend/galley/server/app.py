@@ -1,0 +1,171 @@
+"""The application: everything built once, in one place, and handed down."""
+
+from __future__ import annotations
+
+import asyncio
+import gc
+import logging
+from collections.abc import AsyncIterator, Mapping
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+from fastapi import FastAPI, Request
+from fastapi.responses import Response
+from starlette.exceptions import HTTPException
+from starlette.staticfiles import StaticFiles
+from starlette.types import Scope
+
+from galley.agents.catalogue import Catalogue
+from galley.errors import GalleyError
+from galley.kitchen import Kitchen, Layout, warm
+from galley.kitchen.layout_file import load_layouts
+from galley.records import Store
+from galley.server.clock import Clock
+from galley.server.matches import Matches, round_layout
+from galley.server.origin import HEADERS, SecureHeaders
+from galley.server.pages import NO_PAGE, Pages, templates
+from galley.server.play import Play
+from galley.server.settings import Settings
+from galley.server.thinking import Thinking
+from galley.server.visits import Visits
+from galley.study.plan import plan_visit, visit_seed
+from galley.study.study import Study, load_study
+from galley.workspace import Workspace
+
+LOG = logging.getLogger(__name__)
+STATIC_KEPT_S = 300
+REHEARSED_TICKS = 3
+
+BROKEN = (
+    "Something went wrong here, not with you. What you answered so far is stored. "
+    "Please load this page again in a moment; you will be where you were."
+)
+
+
+def create_app(workspace: Workspace, store: Store, settings: Settings) -> FastAPI:
+    """The application that serves a workspace's studies (or the one that the settings name) into a store.
+
+    Kernels are compiled and every agent that a study needs is tried here, so that nothing is left to the
+    first round.
+
+    Raises: GalleyError or InvalidFiles when a study or an agent it needs cannot be used.
+    """
+    studies = _studies(workspace, settings.study)
+    layouts = load_layouts(workspace)
+    catalogue = Catalogue(workspace)
+    warm()
+    _rehearse(studies, layouts, catalogue)
+
+    clock = Clock()
+    thinking = Thinking(settings.think_window_ms / 1000.0)
+    visits = Visits(store, studies, clock)
+    matches = Matches(store, visits, catalogue, layouts, thinking, clock)
+    frontend = frontend_folder()
+    environment = templates(str(frontend / "templates"))
+    pages = Pages(studies, visits, matches, store, environment, settings.max_form_kib * 1024)
+    play = Play(visits, matches, settings.messages_per_s)
+
+    @asynccontextmanager
+    async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
+        thinking.start()
+        # What is here now stays: the collector need not walk it again in the middle of a tick.
+        gc.collect()
+        gc.freeze()
+        try:
+            yield
+        finally:
+            await matches.stop()
+            await asyncio.wrap_future(store.flush())
+            thinking.stop()
+            gc.unfreeze()
+
+    app = FastAPI(title="Galley", docs_url=None, redoc_url=None, openapi_url=None, lifespan=lifespan)
+    app.include_router(pages.router())
+    app.add_api_websocket_route("/v/{token}/play", play.endpoint)
+    app.mount("/static", Static(directory=frontend), name="static")
+    app.add_middleware(SecureHeaders)
+
+    async def not_here(_request: Request, error: Exception) -> Response:
+        status = error.status_code if isinstance(error, HTTPException) else 404
+        return pages.plain(status, "Not found" if status == 404 else "Not possible", NO_PAGE)
+
+    async def broken(_request: Request, _error: Exception) -> Response:
+        response = pages.plain(500, "Something went wrong", BROKEN)
+        # This page is made outside of the middleware.
+        response.headers.update(HEADERS)
+        return response
+
+    app.add_exception_handler(HTTPException, not_here)
+    app.add_exception_handler(Exception, broken)
+    return app
+
+
+class Static(StaticFiles):
+    """The frontend's styles, scripts and sprites; its templates are not for the world."""
+
+    async def get_response(self, path: str, scope: Scope) -> Response:
+        """One file, kept by browsers for a few minutes."""
+        if not path.startswith(("css/", "js/", "sprites/")):
+            raise HTTPException(404)
+        response = await super().get_response(path, scope)
+        response.headers["cache-control"] = f"public, max-age={STATIC_KEPT_S}"
+        return response
+
+
+def frontend_folder() -> Path:
+    """Where templates, styles, scripts and sprites are: in the installed package, or in a checkout.
+
+    Raises: GalleyError when this installation has none.
+    """
+    package = Path(__file__).resolve().parents[1]
+    for folder in (package / "_frontend", package.parents[1] / "frontend"):
+        if (folder / "templates").is_dir():
+            return folder
+    raise GalleyError("this installation of Galley holds no frontend; install it again")
+
+
+def _studies(workspace: Workspace, only: str) -> Mapping[str, Study]:
+    names = (only,) if only else workspace.names("studies")
+    if not names:
+        raise GalleyError(
+            f"{workspace.path / 'studies'}: there is no study to serve; write one, see docs/first-study.md"
+        )
+    return {name: load_study(workspace, name) for name in names}
+
+
+def _rehearse(studies: Mapping[str, Study], layouts: Mapping[str, Layout], catalogue: Catalogue) -> None:
+    """Let every agent act on every layout that a visit can bring it to, from both seats.
+
+    Raises: GalleyError naming agent and layout when one cannot.
+    """
+    rehearsed = set()
+    for study in studies.values():
+        # One plan has them all: visits differ in order, seats and colours only.
+        for step in plan_visit(study, visit_seed(study, 0), 0).steps:
+            if step.kind != "round":
+                continue
+            layout = round_layout(layouts, step.data)
+            name = step.data["agent"]
+            if (name, layout) in rehearsed:
+                continue
+            rehearsed.add((name, layout))
+            bundle = catalogue.bundle(name)
+            try:
+                for seat in (0, 1):
+                    agent = bundle.make()
+                    agent.reset(layout, seat, 0)
+                    kitchen = Kitchen(layout)
+                    for tick in range(min(REHEARSED_TICKS, layout.rules.horizon_ticks)):
+                        before = kitchen.state.copy()
+                        action = agent.act(before, tick)
+                        joint = (action, 4) if seat == 0 else (4, action)
+                        kitchen.step(*joint)
+                        agent.observe(before, joint)
+            except GalleyError:
+                raise
+            except Exception as error:
+                raise GalleyError(
+                    f"agents/{name}: it cannot play on layout {layout.name} "
+                    f"({type(error).__name__}: {error}); "
+                    "run `galley agents check`"
+                ) from error

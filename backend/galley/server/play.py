@@ -1,0 +1,194 @@
+"""The play socket: one browser's connection to its round."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections import deque
+
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from galley.server import wire
+from galley.server.journal import Handed
+from galley.server.match import LEFT, RESTART, Match
+from galley.server.matches import Matches
+from galley.server.origin import same_origin
+from galley.server.visits import Visits
+
+LOG = logging.getLogger(__name__)
+MAX_BEHIND = 200
+HELLO_WITHIN_S = 20.0
+CLOSE_WITHIN_S = 5.0
+SERVICE_RESTART = 1012  # RFC 6455 registry: the server is going down; browsers cannot send it
+
+
+class Socket:
+    """Sends frames in order without making anybody wait.
+
+    A browser that is MAX_BEHIND frames behind gets, instead of those, one picture of the whole when it is
+    there again.
+    """
+
+    def __init__(self, websocket: WebSocket) -> None:
+        self.tab = ""
+        self.match: Match | None = None
+        self._websocket = websocket
+        self._loop = asyncio.get_running_loop()
+        self._queue: deque[tuple[str, Handed | None]] = deque()
+        self._wake = asyncio.Event()
+        self._close_code: int | None = None
+        self._behind = False
+
+    def send(self, text: str, handed: Handed | None = None) -> None:
+        """Queue a frame; `handed` learns when it was given to the socket."""
+        if len(self._queue) >= MAX_BEHIND:
+            self._queue.clear()
+            self._behind = True
+        if not self._behind:
+            self._queue.append((text, handed))
+            self._wake.set()
+
+    def close(self, code: int) -> None:
+        """Close once everything queued is sent."""
+        if self._close_code is None:
+            self._close_code = code
+        self._wake.set()
+
+    @property
+    def closing(self) -> bool:
+        """Whether `close` was called."""
+        return self._close_code is not None
+
+    async def run(self) -> None:
+        """Send until closed or lost."""
+        try:
+            while True:
+                while self._queue:
+                    text, handed = self._queue.popleft()
+                    await self._websocket.send_text(text)
+                    if handed is not None:
+                        handed.at_s = self._loop.time()
+                if self._behind:
+                    self._behind = False
+                    if self.match is not None and self.match.connection is self:
+                        self.match.show()
+                        continue
+                if self._close_code is not None:
+                    await self._websocket.close(self._close_code)
+                    return
+                self._wake.clear()
+                await self._wake.wait()
+        except (WebSocketDisconnect, RuntimeError, OSError):
+            # The browser is gone; the listening side sees it too and tells the match.
+            return
+
+
+class Pace:
+    """Keeps a connection to so many messages a second, with two seconds' worth at once."""
+
+    def __init__(self, per_s: float, now_s: float) -> None:
+        self._per_s = per_s
+        self._left = 2.0 * per_s
+        self._at_s = now_s
+
+    def wait_s(self, now_s: float) -> float:
+        """How long to wait before taking the next message."""
+        self._left = min(2.0 * self._per_s, self._left + (now_s - self._at_s) * self._per_s) - 1.0
+        self._at_s = now_s
+        return max(0.0, -self._left / self._per_s)
+
+
+class Play:
+    """The endpoint of all play sockets."""
+
+    def __init__(self, visits: Visits, matches: Matches, messages_per_s: int) -> None:
+        self._visits = visits
+        self._matches = matches
+        self._messages_per_s = messages_per_s
+
+    async def endpoint(self, websocket: WebSocket, token: str) -> None:
+        """One connection from handshake to close; a foreign page or an unknown link gets 403."""
+        if not same_origin(websocket.headers) or await self._visits.find(token) is None:
+            await websocket.close()
+            return
+        await websocket.accept()
+        socket = Socket(websocket)
+        sender = asyncio.create_task(socket.run())
+        reason = LEFT
+        try:
+            reason = await self._listen(websocket, socket, token)
+            if socket.closing:
+                await asyncio.wait([sender], timeout=CLOSE_WITHIN_S)
+        finally:
+            if socket.match is not None:
+                socket.match.leave(socket, reason)
+            sender.cancel()
+
+    async def _listen(self, websocket: WebSocket, socket: Socket, token: str) -> str:
+        loop = asyncio.get_running_loop()
+        pace = Pace(self._messages_per_s, loop.time())
+        hello_by_s = loop.time() + HELLO_WITHIN_S
+        last_seq = -1
+        while True:
+            try:
+                async with asyncio.timeout_at(hello_by_s if socket.match is None else None):
+                    event = await websocket.receive()
+            except TimeoutError:
+                socket.close(wire.CLOSE_REFUSED)
+                return LEFT
+            if event["type"] == "websocket.disconnect":
+                return RESTART if event.get("code") == SERVICE_RESTART else LEFT
+            arrival_s = loop.time()
+            try:
+                text = event.get("text")
+                message = wire.parse(event.get("bytes") or b"" if text is None else text)
+                if isinstance(message, wire.Key | wire.Release):
+                    if message.seq <= last_seq:
+                        raise wire.MessageError(f"seq {message.seq} does not come after {last_seq}")
+                    last_seq = message.seq
+                if isinstance(message, wire.Hello):
+                    if not await self._hello(socket, token, message):
+                        return LEFT
+                elif socket.match is None:
+                    raise wire.MessageError("the first message is hello")
+                else:
+                    _pass_on(socket.match, socket, message, arrival_s)
+            except wire.MessageError as error:
+                socket.send(wire.encode("refused", reason=str(error)))
+            if wait_s := pace.wait_s(arrival_s):
+                await asyncio.sleep(wait_s)
+
+    async def _hello(self, socket: Socket, token: str, hello: wire.Hello) -> bool:
+        """Whether the connection goes on. Raises: MessageError for a second hello."""
+        if socket.match is not None:
+            raise wire.MessageError("hello was said already")
+        if hello.protocol != wire.PROTOCOL:
+            socket.send(
+                wire.encode("refused", reason=f"the protocol is {wire.PROTOCOL}; load the page again")
+            )
+            socket.close(wire.CLOSE_REFUSED)
+            return False
+        visit = await self._visits.find(token)
+        match = None if visit is None else await self._matches.of(visit)
+        if match is None:
+            socket.close(wire.CLOSE_ENDED)
+            return False
+        socket.tab = hello.tab
+        socket.match = match
+        match.join(socket)
+        return True
+
+
+def _pass_on(match: Match, socket: Socket, message: wire.Incoming, arrival_s: float) -> None:
+    """Give a message to the match. Raises: MessageError when it is out of turn."""
+    if match.connection is not socket:
+        raise wire.MessageError("this round is open in another tab")
+    match message:
+        case wire.Ready():
+            match.ready()
+        case wire.Key():
+            match.key(message, arrival_s)
+        case wire.Release():
+            match.release(message, arrival_s)
+        case wire.Ping():
+            match.ping(message, arrival_s)

@@ -1,0 +1,112 @@
+"""Serves until told to stop: the socket, the records and the application, opened and closed in order."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+import uvicorn
+
+from galley.errors import GalleyError
+from galley.records import Store
+from galley.server.app import create_app
+from galley.server.settings import Settings, read_settings
+from galley.workspace import Workspace
+
+MAX_FRAME_BYTES = 256 * 1024
+PING_EVERY_S = 5.0
+PING_WITHIN_S = 10.0
+SHUTDOWN_WITHIN_S = 5
+SWITCH_INTERVAL_S = 0.0005
+BACKLOG = 1024
+
+
+def serve(
+    workspace: Path,
+    *,
+    study: str | None = None,
+    host: str | None = None,
+    port: int | None = None,
+    database: str | None = None,
+    environ: Mapping[str, str] | None = None,
+) -> None:
+    """Serve a workspace until SIGINT or SIGTERM; prints the URL once it listens.
+
+    Options that are None come from the environment, see `galley.server.settings`.
+
+    Raises: GalleyError when the port is taken, the database cannot be opened or served, or a study cannot be
+    used.
+    """
+    settings = read_settings(
+        os.environ if environ is None else environ, study=study, host=host, port=port, database=database
+    )
+    place = Workspace(workspace)
+    listening = listen(settings)
+    try:
+        url = settings.database or f"sqlite:///{place.path.resolve() / '.data' / 'galley.sqlite'}"
+        with Store.open(url, serving=True) as store:
+            app = create_app(place, store, settings)
+            config = uvicorn.Config(
+                app,
+                loop="auto",
+                lifespan="on",
+                ws="websockets-sansio",
+                ws_max_size=MAX_FRAME_BYTES,
+                ws_per_message_deflate=False,
+                ws_ping_interval=PING_EVERY_S,
+                ws_ping_timeout=PING_WITHIN_S,
+                access_log=False,
+                log_level=settings.log_level,
+                server_header=False,
+                timeout_graceful_shutdown=SHUTDOWN_WITHIN_S,
+            )
+            # A thread that wants the interpreter gets it sooner: a tick waits less for an agent that thinks
+            # in Python.
+            sys.setswitchinterval(SWITCH_INTERVAL_S)
+            # After its own shutdown uvicorn raises the signal again; the records must be closed then too.
+            signal.signal(signal.SIGTERM, signal.default_int_handler)
+            try:
+                Announcing(config, settings, listening).run(sockets=[listening])
+            except KeyboardInterrupt:
+                return
+    finally:
+        listening.close()
+
+
+class Announcing(uvicorn.Server):
+    """A server that says where it is as soon as it can be reached."""
+
+    def __init__(self, config: uvicorn.Config, settings: Settings, listening: socket.socket) -> None:
+        super().__init__(config)
+        self._settings = settings
+        self._port = listening.getsockname()[1]
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Start, then print the URL."""
+        await super().startup(sockets)
+        if self.started:
+            host = self._settings.host
+            anywhere = {"0.0.0.0": "127.0.0.1", "::": "::1"}  # noqa: S104
+            reached = anywhere.get(host, host)
+            shown = f"[{reached}]" if ":" in reached else reached
+            sys.stdout.write(f"http://{shown}:{self._port}\n")
+            sys.stdout.flush()
+
+
+def listen(settings: Settings) -> socket.socket:
+    """The listening socket.
+
+    Raises: GalleyError when the address is taken or not this machine's.
+    """
+    family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
+    try:
+        return socket.create_server((settings.host, settings.port), family=family, backlog=BACKLOG)
+    except OSError as error:
+        raise GalleyError(
+            f"cannot listen on {settings.host} port {settings.port} ({error.strerror or error}); "
+            "choose another with --port or --host"
+        ) from None
