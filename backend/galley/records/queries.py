@@ -7,10 +7,24 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import Connection, select
+from sqlalchemy import Connection, Table, select
 
+from galley.errors import GalleyError
 from galley.records.rows import RoundRow, SeatRow, VisitRow
 from galley.records.tables import ROUNDS, SEATS, TICKS, VISITS
+
+
+def studies(connection: Connection) -> tuple[str, ...]:
+    """The names of all studies that were visited, sorted."""
+    return tuple(connection.execute(select(VISITS.c.study).distinct().order_by(VISITS.c.study)).scalars())
+
+
+def must_know(connection: Connection, database: str, study: str) -> None:
+    """Nothing, if somebody visited the study. Raises GalleyError otherwise, naming the studies there are."""
+    known = studies(connection)
+    if study not in known:
+        there = f"it has {', '.join(known)}" if known else "nobody has visited any study"
+        raise GalleyError(f"{database}: holds no visit of study {study!r}; {there}")
 
 
 def visit(connection: Connection, token: str) -> VisitRow | None:
@@ -56,11 +70,11 @@ def rounds_of_study(connection: Connection, study: str) -> list[int]:
     )
 
 
-def round_row(connection: Connection, round_id: int) -> RoundRow | None:
-    """The round with this id and its joint actions."""
+def round_row(connection: Connection, round_id: int) -> RoundRow:
+    """The round with this id and its joint actions. Raises GalleyError if there is none."""
     found = connection.execute(select(ROUNDS).where(ROUNDS.c.id == round_id)).mappings().one_or_none()
     if found is None:
-        return None
+        raise GalleyError(f"there is no round {round_id}")
     seats = connection.execute(
         select(SEATS).where(SEATS.c.round_id == round_id).order_by(SEATS.c.seat)
     ).mappings()
@@ -78,3 +92,9 @@ def joint_actions(connection: Connection, round_id: int) -> NDArray[np.uint8]:
     )
     pairs = [tuple(row) for row in connection.execute(query)]
     return np.array(pairs, dtype=np.uint8).reshape(-1, 2)
+
+
+def of_round(connection: Connection, table: Table, round_id: int) -> list[dict[str, Any]]:
+    """The rows of a round in a table keyed by round, in the order of its key."""
+    query = select(table).where(table.c.round_id == round_id).order_by(*table.primary_key.columns)
+    return [dict(row) for row in connection.execute(query).mappings()]

@@ -7,10 +7,10 @@ Actions: 0 north, 1 south, 2 east, 3 west, 4 stay, 5 interact.
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 from sqlalchemy import (
-    JSON,
     BigInteger,
     Boolean,
     Column,
@@ -23,8 +23,10 @@ from sqlalchemy import (
     String,
     Table,
     Text,
+    TypeDecorator,
     UniqueConstraint,
 )
+from sqlalchemy.engine import Dialect
 from sqlalchemy.types import TypeEngine
 
 # Names given here, not by the database, so that a later migration can drop a constraint on any of them.
@@ -36,6 +38,22 @@ METADATA = MetaData(
         "ix": "ix_%(table_name)s_%(column_0_N_name)s",
     }
 )
+
+
+class Json(TypeDecorator[Any]):
+    """Plain JSON kept as text: a column declared JSON would make numbers of some texts in SQLite."""
+
+    impl = Text
+    cache_ok = True
+
+    def process_bind_param(self, value: Any, dialect: Dialect) -> str:
+        """The text that is stored."""
+        return json.dumps(value)
+
+    def process_result_value(self, value: str | None, dialect: Dialect) -> Any:
+        """What the stored text says."""
+        return None if value is None else json.loads(value)
+
 
 # SQLite only numbers rows by itself when the key's type is exactly INTEGER.
 _ROW_ID = BigInteger().with_variant(Integer, "sqlite")
@@ -78,8 +96,8 @@ VISITS = Table(
     _of("visit_no", Integer, "number of the visit within its study, from 0, in order of arrival"),
     _of("seed", String(64), "seed of everything drawn at random for this visit"),
     _of("plan_json", Text, "the steps of this visit with everything drawn for them, as JSON"),
-    _of("condition", JSON, "factor: level, for each factor that varies between participants"),
-    _of("link_params", JSON, "parameters of the participant's link, such as a recruiter's identifier"),
+    _of("condition", Json, "factor: level, for each factor that varies between participants"),
+    _of("link_params", Json, "parameters of the participant's link, such as a recruiter's identifier"),
     _of("step_index", Integer, "position in the plan, from 0"),
     _of("status", String(20), "one of: " + ", ".join(VISIT_STATUSES)),
     _of("completion_code", String(200), "code shown at the end, once it was reached", nullable=True),
@@ -107,8 +125,8 @@ RESPONSES = Table(
     _of("step_id", String(200), "step of the visit's plan", primary_key=True),
     _of("item", String(200), "item of the step's questionnaire", primary_key=True),
     _of("position", Integer, "place of the item on its page, from 1"),
-    _of("value", JSON, "the answer: a number, a text, an option, a list of options, or null if left open"),
-    _of("shown", JSON, "the item as it was shown: kind, text, options or scale", nullable=True),
+    _of("value", Json, "the answer: a number, a text, an option, a list of options, or null if left open"),
+    _of("shown", Json, "the item as it was shown: kind, text, options or scale; null if it is unknown"),
     _of("at_ms", BigInteger, "when the answer was stored"),
     info={"meaning": "one row per answered item"},
 )

@@ -49,8 +49,8 @@ def upgrade() -> None:
         sa.Column("visit_no", sa.Integer(), nullable=False),
         sa.Column("seed", sa.String(length=64), nullable=False),
         sa.Column("plan_json", sa.Text(), nullable=False),
-        sa.Column("condition", sa.JSON(), nullable=False),
-        sa.Column("link_params", sa.JSON(), nullable=False),
+        sa.Column("condition", sa.Text(), nullable=False),
+        sa.Column("link_params", sa.Text(), nullable=False),
         sa.Column("step_index", sa.Integer(), nullable=False),
         sa.Column("status", sa.String(length=20), nullable=False),
         sa.Column("completion_code", sa.String(length=200), nullable=True),
@@ -104,8 +104,8 @@ def upgrade() -> None:
         sa.Column("step_id", sa.String(length=200), nullable=False),
         sa.Column("item", sa.String(length=200), nullable=False),
         sa.Column("position", sa.Integer(), nullable=False),
-        sa.Column("value", sa.JSON(), nullable=False),
-        sa.Column("shown", sa.JSON(), nullable=True),
+        sa.Column("value", sa.Text(), nullable=False),
+        sa.Column("shown", sa.Text(), nullable=False),
         sa.Column("at_ms", sa.BigInteger(), nullable=False),
         sa.ForeignKeyConstraint(
             ["visit_id"], ["visits.id"], name="fk_responses_visit_id", ondelete="CASCADE"

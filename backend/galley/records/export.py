@@ -1,0 +1,186 @@
+"""A study's records as CSV files with their data dictionary, written row by row whatever their size."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import Connection, select
+
+from galley.errors import GalleyError
+from galley.records import queries
+from galley.records.csv_file import CsvFile
+from galley.records.dictionary import dictionary_csv, dictionary_markdown
+from galley.records.export_round import RoundExport
+from galley.records.rows import RoundRow, VisitRow
+from galley.records.sheets import PARTICIPANTS, RESPONSES_SHEET, SHEETS, STAGES_SHEET
+from galley.records.store import Store
+from galley.records.tables import RESPONSES, STAGES
+from galley.study.plan import Plan, Step
+
+
+def export_study(store: Store, study: str, out: Path) -> dict[str, int]:
+    """Rows written per file name, after writing the study's records to the folder `out`.
+
+    Everything is read from the database as it stood at the start, however long the export takes.
+    Raises: GalleyError if nobody visited the study, or the folder cannot be written.
+    """
+    with store.reading() as connection:
+        queries.must_know(connection, store.name, study)
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+            with ExitStack() as stack:
+                files = {sheet.name: stack.enter_context(CsvFile(out, sheet)) for sheet in SHEETS}
+                for visit in queries.visits(connection, study):
+                    _Visit(connection, visit, files).write()
+            (out / "data-dictionary.md").write_text(dictionary_markdown(), encoding="utf-8")
+            (out / "data-dictionary.csv").write_text(dictionary_csv(), encoding="utf-8", newline="")
+        except OSError as error:
+            raise GalleyError(f"{out}: {error.strerror or error}; name another folder with --out") from None
+    return {file.sheet.file: file.rows for file in files.values()}
+
+
+class _Visit:
+    """Writes everything about one visit."""
+
+    def __init__(self, connection: Connection, visit: VisitRow, files: Mapping[str, CsvFile]) -> None:
+        self.connection = connection
+        self.visit = visit
+        self.files = files
+        self.plan = Plan.from_json(visit.plan_json)
+        self.places = {step.id: place for place, step in enumerate(self.plan.steps)}
+        self.who = {
+            "participant": visit.participant,
+            "visit_no": visit.visit_no,
+            "condition": visit.condition,
+        }
+
+    def write(self) -> None:
+        statuses = []
+        for round_id in queries.rounds_of_visit(self.connection, self.visit.id):
+            row = queries.round_row(self.connection, round_id)
+            step = self._step(str(row.human.step_id))
+            if not step.data.get("tutorial"):
+                statuses.append(row.status)
+            self._round(row, step)
+        self._participant(statuses)
+        self._stages()
+        self._responses()
+
+    def _step(self, step_id: str) -> Step:
+        return self.plan.steps[self.places[step_id]]
+
+    def _round(self, row: RoundRow, step: Step) -> None:
+        at = {**self.who, "step_index": self.places[step.id], "step": step.id}
+        RoundExport(self.connection, row, step.data, at).write(self.files)
+
+    def _participant(self, statuses: list[str]) -> None:
+        visit = self.visit
+        self.files[PARTICIPANTS.name].write(
+            {
+                **self.who,
+                "study": visit.study,
+                "study_sha256": visit.study_sha256,
+                "seed": visit.seed,
+                "status": visit.status,
+                "step_index": visit.step_index,
+                "step": self.plan.steps[visit.step_index].id,
+                "steps": len(self.plan.steps),
+                "completion_code": visit.completion_code,
+                "hats": self.plan.hats,
+                "link_params": visit.link_params,
+                "begun_utc": visit.created_ms,
+                "ended_utc": visit.ended_ms,
+                "duration_s": _seconds(visit.created_ms, visit.ended_ms),
+                "rounds_finished": statuses.count("finished"),
+                "rounds_abandoned": statuses.count("abandoned"),
+            }
+        )
+
+    def _stages(self) -> None:
+        query = select(STAGES).where(STAGES.c.visit_id == self.visit.id)
+        rows = self.connection.execute(query).mappings().all()
+        for row in sorted(rows, key=lambda row: self.places[row["step_id"]]):
+            step = self._step(row["step_id"])
+            self.files[STAGES_SHEET.name].write(
+                {
+                    **self.who,
+                    "step_index": self.places[step.id],
+                    "step": step.id,
+                    "kind": step.kind,
+                    "title": step.title,
+                    "entered_utc": row["entered_ms"],
+                    "left_utc": row["left_ms"],
+                    "duration_s": _seconds(row["entered_ms"], row["left_ms"]),
+                    "views": row["views"],
+                }
+            )
+
+    def _responses(self) -> None:
+        query = select(RESPONSES).where(RESPONSES.c.visit_id == self.visit.id)
+        rows = self.connection.execute(query).mappings().all()
+        for row in sorted(rows, key=lambda row: (self.places[row["step_id"]], row["position"])):
+            step = self._step(row["step_id"])
+            shown = row["shown"] or {}
+            self.files[RESPONSES_SHEET.name].write(
+                {
+                    **self.who,
+                    "step_index": self.places[step.id],
+                    "step": step.id,
+                    "questionnaire": step.data.get("questionnaire"),
+                    "position": row["position"],
+                    "item": row["item"],
+                    **{
+                        name: shown.get(name) for name in ("kind", "text", "scale", "low_label", "high_label")
+                    },
+                    "value": _joined(row["value"]),
+                    "label": _label(row["value"], shown),
+                    "answered_utc": row["at_ms"],
+                    **self._asked_about(step),
+                    **_compared(step, row["value"], shown),
+                }
+            )
+
+    def _asked_about(self, step: Step) -> dict[str, Any]:
+        """The round that a questionnaire follows; a comparison and a survey are about no single round."""
+        names = ("round_no", "layout", "agent", "partner_hat")
+        if step.data.get("round_no") is None:
+            return dict.fromkeys(names)
+        before = self.plan.steps[: self.places[step.id]]
+        played = next(s for s in reversed(before) if s.kind == "round")
+        return {name: played.data[name] for name in names}
+
+
+def _compared(step: Step, value: Any, shown: Mapping[str, Any]) -> dict[str, Any]:
+    sides: dict[str, Any] = {
+        f"{side}_{what}": step.data.get(side, {}).get(what)
+        for side in ("first", "second")
+        for what in ("agent", "hat")
+    }
+    preference = preferred = None
+    if shown.get("kind") == "comparison" and value is not None:
+        preference = value - (shown["scale"] + 1) / 2
+        side = "first" if preference < 0 else "second"
+        preferred = sides[f"{side}_agent"] if preference else None
+    return {**sides, "preference": preference, "preferred_agent": preferred}
+
+
+def _joined(value: Any) -> Any:
+    return " | ".join(map(str, value)) if isinstance(value, list) else value
+
+
+def _label(value: Any, shown: Mapping[str, Any]) -> str | None:
+    """The words that were shown for a chosen option or a labelled point of a scale."""
+    if value is None:
+        return None
+    if shown.get("labels"):
+        return str(shown["labels"][value - 1])
+    words = {option["value"]: option["label"] for option in shown.get("options", ())}
+    chosen = value if isinstance(value, list) else [value]
+    return " | ".join(words.get(one, str(one)) for one in chosen) if words else None
+
+
+def _seconds(start_ms: int, end_ms: int | None) -> float | None:
+    return None if end_ms is None else (end_ms - start_ms) / 1000
