@@ -1,7 +1,7 @@
 """How well and how together two chefs cooked.
 
-Source: Fontaine et al. (LSI paper), Sec. V and the user study for workload, concurrent motion and stuck ticks;
-its App. C for the performance function.
+Source: Fontaine et al. (LSI paper), Sec. V and the user study for workload, concurrent motion and stuck
+ticks; App. C for the performance function.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +38,7 @@ HUMAN: Final = Seat("human")
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """One episode: `joint_actions` uint8[T,2]; `initial` int16[S] where it did not begin at the layout's start.
+    """One episode: `joint_actions` uint8[T,2], and `initial` int16[S] if it did not begin at the start.
 
     Raises:
         GalleyError: the actions or the initial state cannot belong to this layout.
@@ -64,7 +64,7 @@ class Trajectory:
 
 @dataclass(frozen=True, eq=False)
 class Replay:
-    """An episode run again: `states` int16[T+1,S] around its T ticks and what each wrote, `out` int32[T,4]."""
+    """An episode run again: `states` int16[T+1,S] around its ticks, and what each wrote, `out` int32[T,4]."""
 
     layout: Layout
     states: NDArray[np.int16]
@@ -201,7 +201,7 @@ def _is_count(value: object) -> bool:
     return isinstance(value, int) and not isinstance(value, bool) and value >= 0
 
 
-def _is_joint_action(value: object) -> bool:
+def _is_joint_action(value: object) -> TypeGuard[list[int]]:
     return (
         isinstance(value, list) and len(value) == 2 and all(_is_count(a) and a < len(ACTIONS) for a in value)
     )
