@@ -35,6 +35,8 @@ def explain(
 ) -> Iterator[tuple[Loc, str, str]]:
     """(place in the file, what is wrong, how to fix it) for each error of validating `data` as `model`."""
     for detail in error.errors(include_url=False):
+        if detail["type"] == "too_short" and len(detail["input"]) >= detail["ctx"]["min_length"]:
+            continue  # pydantic counts valid members only; the invalid ones tell their own story
         loc = _place(detail["loc"], data)
         if detail["type"] == "galley":
             for below, message, fix in detail["ctx"]["problems"]:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -13,7 +14,7 @@ from galley.agents.bundle import Bundle, load_bundle
 from galley.errors import InvalidFiles, Problem
 from galley.files import Loaded, Loc, load
 from galley.kitchen import Layout
-from galley.kitchen.layout_file import load_layouts
+from galley.kitchen.layout_file import load_layout, load_layouts
 from galley.study.config import (
     Comparison,
     Consent,
@@ -116,8 +117,15 @@ def known_layouts_of(
         layouts = load_layouts(workspace)
     except InvalidFiles as invalid:
         problems += invalid.problems
-        return {}, workspace.names("layouts")
-    return layouts, tuple(layouts)
+        layouts = dict(_good_layouts(workspace))
+    return layouts, tuple({*layouts, *workspace.names("layouts")})
+
+
+def _good_layouts(workspace: Workspace) -> Iterator[tuple[str, Layout]]:
+    for name in workspace.names("layouts"):
+        with suppress(InvalidFiles):
+            layout = load_layout(workspace.find("layouts", name))
+            yield from ((called, layout) for called in (*layout.aliases, name))
 
 
 def estimated_minutes(config: StudyFile, questionnaires: Mapping[str, Questionnaire]) -> int:
