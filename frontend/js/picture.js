@@ -1,0 +1,60 @@
+/** Redraws the kitchen pictures on a page with the drawings of the game; without it they are made of tiles. */
+
+import { boardFrom } from "./board.js";
+import { draw } from "./draw.js";
+import { still } from "./kitchen.js";
+import { HATS, Sprites, loadImages, newCanvas } from "./sprites.js";
+import { tileFor } from "./view.js";
+
+/** @typedef {import("./wire.js").ChefRow} ChefRow */
+
+const TALLEST_PX = 420;
+const LARGEST_TILE = 84;
+const WORDS = Object.keys(HATS);
+
+/**
+ * Where the two chefs of an ASCII drawing stand.
+ * @param {string[]} rows
+ * @returns {[ChefRow, ChefRow] | null}
+ */
+function starts(rows) {
+  /** @param {string} mark @returns {ChefRow | null} */
+  const find = (mark) => {
+    const y = rows.findIndex((row) => row.includes(mark));
+    return y < 0 ? null : [rows[y]?.indexOf(mark) ?? 0, y, 1, 0];
+  };
+  const [first, second] = [find("1"), find("2")];
+  return first && second ? [first, second] : null;
+}
+
+/** @param {HTMLElement} figure @param {Map<string, HTMLImageElement>} images */
+function redraw(figure, images) {
+  const tiles = figure.querySelector(".kitchen-tiles");
+  const rows = (figure.dataset.grid ?? "").split("/");
+  const chefs = starts(rows);
+  if (!tiles || !chefs) return;
+  const density = window.devicePixelRatio || 1;
+  const css = Math.min(LARGEST_TILE, tileFor(rows[0]?.length ?? 1, rows.length, figure.clientWidth, TALLEST_PX));
+  const sprites = new Sprites(images, Math.floor(css * density));
+  const grid = rows.map((row) => row.replace(/[12]/g, " "));
+  const kitchen = still(grid, sprites);
+  const { canvas, context } = newCanvas(kitchen.width, kitchen.height);
+  const hats = /** @type {[string, string]} */ ([figure.dataset.hat ?? WORDS[4], figure.dataset.partnerHat ?? WORDS[0]]);
+  const pots = grid.flatMap((row, y) => [...row].flatMap((tile, x) =>
+    tile === "P" ? [/** @type {import("./wire.js").PotRow} */ ([x, y, 0, 0, 0, false])] : []));
+  draw(context, boardFrom({
+    type: "keyframe", phase: "ended", tick: 99, horizon: 99, tick_ms: 150, seat: 0, hats, grid, cook_time: 20, chefs,
+    things: [], pots, score: 0, goal: null, round: 1, of: 1, tutorial: false, orders: null,
+  }), sprites, kitchen, 0);
+  canvas.className = "kitchen-canvas";
+  canvas.setAttribute("role", "img");
+  canvas.setAttribute("aria-label", tiles.getAttribute("aria-label") ?? "A kitchen");
+  canvas.style.width = `${kitchen.width / density}px`;
+  tiles.replaceWith(canvas);
+}
+
+const figures = [...document.querySelectorAll("figure.kitchen-picture")];
+if (figures.length > 0) {
+  const images = await loadImages("/static/sprites/");
+  for (const figure of figures) if (figure instanceof HTMLElement) redraw(figure, images);
+}
