@@ -37,7 +37,7 @@ def explain(
     for detail in error.errors(include_url=False):
         if detail["type"] == "too_short" and len(detail["input"]) >= detail["ctx"]["min_length"]:
             continue  # pydantic counts valid members only; the invalid ones tell their own story
-        loc = _place(detail["loc"], data)
+        loc = _place(detail["loc"], data, missing=detail["type"] == "missing")
         if detail["type"] == "galley":
             for below, message, fix in detail["ctx"]["problems"]:
                 yield (*loc, *below), message, fix
@@ -45,8 +45,8 @@ def explain(
             yield loc, *_words(detail, loc, model)
 
 
-def _place(loc: Loc, data: Any) -> Loc:
-    """The key path in the file: without the tags of unions, with the name of a missing key at its end."""
+def _place(loc: Loc, data: Any, *, missing: bool) -> Loc:
+    """The key path in the file: without the tags of unions, with the name of a `missing` key at its end."""
     path: list[str | int] = []
     for index, part in enumerate(loc):
         inside = (isinstance(data, dict) and part in data) or (
@@ -54,7 +54,7 @@ def _place(loc: Loc, data: Any) -> Loc:
         )
         if inside:
             data = data[part]
-        if inside or (index == len(loc) - 1 and isinstance(data, dict)):
+        if inside or (missing and index == len(loc) - 1):
             path.append(part)
     return tuple(path)
 
