@@ -2,7 +2,6 @@
 
 What the numbers mean is told in `observations.py` and `docs/rules.md`.
 """
-# mypy: disable-error-code="no-any-return"
 
 from __future__ import annotations
 
@@ -71,17 +70,17 @@ def _grid(
     spec: NDArray[int16], static: NDArray[uint8], state: NDArray[int16], seat: int, out: NDArray[uint8]
 ) -> None:
     """Nothing; writes one seat's `grid` into `out` uint8[26*H*W]; `static` holds the map's channels."""
-    cells = spec[SPEC_WIDTH] * spec[SPEC_HEIGHT]
+    cells = int(spec[SPEC_WIDTH]) * int(spec[SPEC_HEIGHT])
     for index in range(static.size):
         out[index] = static[index]
     own = CHEF * seat
     other = CHEF - own
     out[G_OWN * cells + state[own + CELL]] = 1
     out[G_OTHER * cells + state[other + CELL]] = 1
-    out[(G_OWN_FACING + state[own + FACING]) * cells + state[own + CELL]] = 1
-    out[(G_OTHER_FACING + state[other + FACING]) * cells + state[other + CELL]] = 1
+    out[(G_OWN_FACING + int(state[own + FACING])) * cells + state[own + CELL]] = 1
+    out[(G_OTHER_FACING + int(state[other + FACING])) * cells + state[other + CELL]] = 1
     for cell in range(cells):
-        thing = state[CELLS + cell]
+        thing = int(state[CELLS + cell])
         if thing == NOTHING:
             continue
         if spec[SPEC_TILES + cell] != POT:
@@ -92,14 +91,15 @@ def _grid(
         if count < INGREDIENTS_PER_SOUP:
             out[(G_IN_POT + kind) * cells + cell] = count
             continue
-        remaining = spec[SPEC_COOK_TIME] - thing // POT_TICKS
+        remaining = int(spec[SPEC_COOK_TIME]) - thing // POT_TICKS
         out[(G_IN_SOUP + kind) * cells + cell] = count
         out[G_REMAINING * cells + cell] = min(remaining, LARGEST)
         if remaining <= 0:
             out[G_DONE * cells + cell] = 1
     for chef in (0, CHEF):
-        if state[chef + HELD] != NOTHING:
-            _grid_thing(state[chef + HELD], state[chef + CELL], cells, out)
+        held = int(state[chef + HELD])
+        if held != NOTHING:
+            _grid_thing(held, int(state[chef + CELL]), cells, out)
     if spec[SPEC_HORIZON] - state[TICK] < URGENT_TICKS:
         out[G_URGENT * cells : (G_URGENT + 1) * cells] = 1
 
@@ -109,8 +109,8 @@ def _grid_2019(
     spec: NDArray[int16], static: NDArray[uint8], state: NDArray[int16], seat: int, out: NDArray[uint8]
 ) -> None:
     """Nothing; writes one seat's `overcooked-2019-grid` into `out` uint8[W*H*20]."""
-    width = spec[SPEC_WIDTH]
-    height = spec[SPEC_HEIGHT]
+    width = int(spec[SPEC_WIDTH])
+    height = int(spec[SPEC_HEIGHT])
     for index in range(static.size):
         out[index] = static[index]
     own = CHEF * seat
@@ -119,7 +119,7 @@ def _grid_2019(
     held_dish = False
     held_onion = False
     for player, place, facings in ((own, 0, 2), (other, 1, 6)):
-        cell = state[player + CELL]
+        cell = int(state[player + CELL])
         at = ((cell % width) * height + cell // width) * C_CHANNELS
         out[at + place] = 1
         out[at + facings + state[player + FACING]] = 1
@@ -134,7 +134,7 @@ def _grid_2019(
             held_onion = True
             out[at + C_ONIONS] = 1
     for cell in range(width * height):
-        thing = state[CELLS + cell]
+        thing = int(state[CELLS + cell])
         if thing == NOTHING:
             continue
         at = ((cell % width) * height + cell // width) * C_CHANNELS
@@ -156,16 +156,16 @@ def _closest(
     state: NDArray[int16], chef: int, out: NDArray[float32], at: int,
 ) -> None:  # fmt: skip
     """Nothing; writes (dx, dy) to the closest target of a kind (and for pots, condition) at `out[at]`."""
-    cell = state[chef + CELL]
+    cell = int(state[chef + CELL])
     pose = cell * STAY + state[chef + FACING]
     best = NO_WAY
     found = NO_WAY
     for index in range(targets.shape[0]):
         if targets[index, 0] != kind or costs[pose, index] == NO_WAY:
             continue
-        target = targets[index, 1]
+        target = int(targets[index, 1])
         if wanted != ANY_POT:
-            pot = state[CELLS + target]
+            pot = int(state[CELLS + target])
             count = pot // POT_COUNT % POT_COUNT
             if wanted == EMPTY_POT:
                 fits = count == 0
@@ -205,7 +205,7 @@ def _player_2019(
     if held != DISH:
         _closest(spec, costs, targets, F_DISHES, ANY_POT, state, chef, out, F_DISH)
     _closest(spec, costs, targets, F_SERVINGS, ANY_POT, state, chef, out, F_SERVING)
-    cell = state[chef + CELL]
+    cell = int(state[chef + CELL])
     width = spec[SPEC_WIDTH]
     for facing, ahead in enumerate((cell - width, cell + width, cell + 1, cell - 1)):
         if spec[SPEC_TILES + ahead] != FLOOR:
