@@ -11,14 +11,16 @@ from sqlalchemy import Connection
 
 from galley.errors import GalleyError
 from galley.kitchen import ACTIONS
+from galley.kitchen.codes import OUT_REWARD
 from galley.records import queries
 from galley.records.csv_file import CsvFile
-from galley.records.replay import Replay, replay_round
+from galley.records.replay import Replayed, replay_round
 from galley.records.rows import RoundRow
 from galley.records.sheets import (
     CLOCKS_SHEET,
     EVENTS_SHEET,
     KEYS_SHEET,
+    MEASURES,
     PAUSES_SHEET,
     ROUNDS_SHEET,
     TICKS_SHEET,
@@ -48,9 +50,9 @@ class RoundExport:
         self.clocks = [ping for ping in queries.of_round(connection, CLOCKS, row.id) if ping["seat"] == seat]
         self.replay = self._replay()
 
-    def _replay(self) -> Replay | None:
+    def _replay(self) -> Replayed | None:
         try:
-            replay = replay_round(self.row, tuple(tick["tick"] for tick in self.ticks))
+            replay = replay_round(self.row, [tick["tick"] for tick in self.ticks])
         except GalleyError:  # `galley trajectories verify` tells what is wrong; here the rest still counts
             return None
         return None if replay.problems else replay
@@ -110,12 +112,22 @@ class RoundExport:
         }
 
     def _measures(self) -> dict[str, Any]:
-        raise NotImplementedError
+        if self.replay is None:
+            return dict.fromkeys(field.name for field in MEASURES)
+        found = self.replay.measures
+        chefs = {
+            f"{name}_{what}": getattr(found, what)[seat]
+            for name, seat in (("human", self.human.seat), ("partner", self.partner.seat))
+            for what in ("ingredients", "dishes", "served", "blocked")
+        }
+        together = ("concurrent_ticks", "stuck_ticks", "delivery_ticks", "performance")
+        return {**chefs, **{name: getattr(found, name) for name in together}}
 
     def _write_ticks(self, file: CsvFile) -> None:
+        rewards = None if self.replay is None else self.replay.episode.out[:, OUT_REWARD].tolist()
         score = 0
         for number, tick in enumerate(self.ticks):
-            reward = None if self.replay is None else self.replay.rewards[number]
+            reward = None if rewards is None else rewards[number]
             score += reward or 0
             actions = {f"action_{seat}": _action(tick[f"action_{seat}"]) for seat in (0, 1)}
             file.write(
@@ -133,7 +145,7 @@ class RoundExport:
 
     def _write_events(self, file: CsvFile) -> None:
         by = {None: None, self.human.seat: "human", self.partner.seat: "partner"}
-        for event in () if self.replay is None else self.replay.events:
+        for event in () if self.replay is None else self.replay.episode.events():
             columns = ("tick", "seat", "kind", "thing", "place", "x", "y", "reward")
             values = {name: getattr(event, name) for name in columns}
             file.write({**self.at, **values, "by": by[event.seat]})

@@ -4,32 +4,32 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from galley.errors import GalleyError
-from galley.kitchen import ACTIONS, Event, Kitchen, Layout
-from galley.kitchen.codes import DELIVERIES
-from galley.records.rows import RoundRow
+from galley.kitchen import Layout
+from galley.kitchen.codes import DELIVERIES, ORDERS_DELIVERED, TICK
+from galley.kitchen.measures import Measures, measures_of
+from galley.kitchen.trajectory import HUMAN, Replay, Seat, Trajectory, play
+from galley.records.rows import RoundRow, SeatRow
 
 
-@dataclass(frozen=True)
-class Replay:
-    """A round played again: states int16 [T+1, S], the reward of each tick, its events, what disagrees."""
+@dataclass(frozen=True, eq=False)
+class Replayed:
+    """A round played again from what is stored, and what disagrees with it."""
 
-    layout: Layout
-    joint_actions: NDArray[np.uint8]
-    states: NDArray[np.int16]
-    rewards: tuple[int, ...]
-    events: tuple[Event, ...]
+    trajectory: Trajectory
+    episode: Replay
     problems: tuple[str, ...]
 
     @property
-    def score(self) -> int:
-        """Reward summed over the round."""
-        return sum(self.rewards)
+    def measures(self) -> Measures:
+        """The measures of the round."""
+        return measures_of(self.episode, self.trajectory)
 
 
 def state_bytes(state: NDArray[np.int16]) -> bytes:
@@ -37,64 +37,68 @@ def state_bytes(state: NDArray[np.int16]) -> bytes:
     return state.astype("<i2").tobytes()
 
 
-def layout_of(row: RoundRow) -> Layout:
-    """The layout that a round was played on. Raises GalleyError if what is stored is none."""
-    try:
-        return Layout.from_dict(json.loads(row.layout_json))
-    except (ValueError, GalleyError) as error:
-        raise GalleyError(f"round {row.id}: its stored layout cannot be read: {error}") from None
+def trajectory_of(row: RoundRow) -> Trajectory:
+    """The trajectory of a stored round, as far as it was played.
 
-
-def replay_round(row: RoundRow, ticks_stored: tuple[int, ...] | None = None) -> Replay:
-    """The round played again from its stored joint actions.
-
-    `ticks_stored`: the numbers of the stored ticks; with them gaps are found.
-    Raises: GalleyError if the layout cannot be read or an action is none.
+    Raises: GalleyError if what is stored is no layout or no action.
     """
-    layout = layout_of(row)
-    wrong = np.argwhere(row.joint_actions >= len(ACTIONS))
-    if len(wrong):
-        tick, seat = map(int, wrong[0])
-        action = int(row.joint_actions[tick, seat])
-        raise GalleyError(f"round {row.id}: tick {tick}, seat {seat}: {action} is no action")
-    kitchen = Kitchen(layout)
-    states = [kitchen.state.copy()]
-    rewards: list[int] = []
-    events: list[Event] = []
-    problems: list[str] = []
-    for tick, (action_0, action_1) in enumerate(row.joint_actions.tolist()):
-        if kitchen.done:
-            problems.append(f"{len(row.joint_actions) - tick} ticks are stored after the end at tick {tick}")
-            break
-        rewards.append(kitchen.step(action_0, action_1))
-        events += kitchen.events
-        states.append(kitchen.state.copy())
-    if ticks_stored is not None and ticks_stored != tuple(range(len(ticks_stored))):
-        problems.append(_gap(ticks_stored))
-    problems += _disagreements(row, kitchen)
-    return Replay(layout, row.joint_actions, np.array(states), tuple(rewards), tuple(events), tuple(problems))
+    try:
+        layout = Layout.from_dict(json.loads(row.layout_json))
+        first, second = map(_seat, row.seats)
+        return Trajectory(layout, row.joint_actions, (first, second), row.seed)
+    except (ValueError, GalleyError) as error:
+        raise GalleyError(f"round {row.id}: {error}") from None
 
 
-def _gap(ticks: tuple[int, ...]) -> str:
-    missing = next(expected for expected, tick in enumerate(ticks) if expected != tick)
-    return f"tick {missing} is missing: ticks {ticks[0]} to {ticks[-1]} are stored, {len(ticks)} in all"
+def _seat(seat: SeatRow) -> Seat:
+    return HUMAN if seat.agent is None else Seat("agent", seat.agent, seat.agent_sha256 or "")
 
 
-def _disagreements(row: RoundRow, kitchen: Kitchen) -> list[str]:
-    problems = []
-    ticks = len(row.joint_actions)
-    if row.status == "finished" and ticks != row.horizon_ticks and not kitchen.done:
-        problems.append(f"it is finished with {ticks} of {row.horizon_ticks} ticks")
-    if ticks > row.horizon_ticks:
-        problems.append(f"{ticks} ticks are stored, its horizon is {row.horizon_ticks}")
+def replay_round(row: RoundRow, ticks_stored: Sequence[int]) -> Replayed:
+    """The round played again from its stored joint actions; `ticks_stored` are the numbers of its ticks.
+
+    Raises: GalleyError if what is stored is no layout or no action.
+    """
+    trajectory = trajectory_of(row)
+    episode = play(trajectory.layout, trajectory.joint_actions)
+    problems = (*_misnumbered(ticks_stored), *_wrong_length(row, episode), *_wrong_end(row, episode))
+    return Replayed(trajectory, episode, problems)
+
+
+def _misnumbered(ticks: Sequence[int]) -> list[str]:
+    for expected, tick in enumerate(ticks):
+        if tick != expected:
+            return [
+                f"tick {expected} is missing: {len(ticks)} ticks from {ticks[0]} to {ticks[-1]} are stored"
+            ]
+    return []
+
+
+def _wrong_length(row: RoundRow, episode: Replay) -> list[str]:
+    stored = len(row.joint_actions)
+    played = int(episode.states[-1, TICK])  # the clock stands still once the episode is over
+    if stored > played:
+        return [f"{stored} ticks are stored, yet the episode is over after {played}"]
+    if stored > row.horizon_ticks:
+        return [f"{stored} ticks are stored, yet its horizon is {row.horizon_ticks}"]
+    if row.status == "finished" and stored != row.horizon_ticks and not _all_served(episode):
+        return [f"it is finished after {stored} of {row.horizon_ticks} ticks"]
+    return []
+
+
+def _all_served(episode: Replay) -> bool:
+    orders = episode.layout.rules.orders
+    return orders is not None and int(episode.states[-1, ORDERS_DELIVERED]) == len(orders)
+
+
+def _wrong_end(row: RoundRow, episode: Replay) -> list[str]:
     if row.status == "open":
-        return problems
-    if row.score != kitchen.score:
-        problems.append(f"score: stored {row.score}, replayed {kitchen.score}")
-    deliveries = int(kitchen.state[DELIVERIES])
-    if row.deliveries != deliveries:
-        problems.append(f"deliveries: stored {row.deliveries}, replayed {deliveries}")
-    last = hashlib.sha256(state_bytes(kitchen.state)).hexdigest()
-    if row.final_sha256 != last:
-        problems.append(f"last state: stored hash {str(row.final_sha256)[:12]}, replayed {last[:12]}")
-    return problems
+        return []
+    last = episode.states[-1]
+    deliveries = int(last[DELIVERIES])
+    found = (
+        ("score", row.score, deliveries * episode.layout.rules.delivery_reward),
+        ("deliveries", row.deliveries, deliveries),
+        ("hash of the last state", row.final_sha256, hashlib.sha256(state_bytes(last)).hexdigest()),
+    )
+    return [f"{what}: stored {was}, replayed {now}" for what, was, now in found if was != now]

@@ -61,7 +61,8 @@ _STEP: Final = (
 def _chef(name: str) -> Iterator[Field]:
     yield Field(f"{name}_ingredients", "whole number", f"ingredients that the {name} took from dispensers")
     yield Field(f"{name}_dishes", "whole number", f"dishes that the {name} took from dispensers")
-    yield Field(f"{name}_served", "whole number", f"orders that the {name} served")
+    yield Field(f"{name}_served", "whole number", f"soups that the {name} delivered")
+    yield Field(f"{name}_blocked", "whole number", f"moves that left the {name} in its cell")
 
 
 PARTICIPANTS: Final = Sheet(
@@ -103,6 +104,15 @@ STAGES_SHEET: Final = Sheet(
         Field("duration_s", "number", "seconds from entering to leaving"),
         _as_in(STAGES.c.views, "whole number"),
     ),
+)
+
+MEASURES: Final = (
+    *_chef("human"),
+    *_chef("partner"),
+    Field("concurrent_ticks", "whole number", "ticks in which neither action was stay"),
+    Field("stuck_ticks", "whole number", "ticks before which both chefs stood and faced as they did before"),
+    Field("delivery_ticks", "JSON", "for each soup that paid, the ticks played when it was delivered"),
+    Field("performance", "number", "how early the order list was served, from 0 to 1; empty without a list"),
 )
 
 ROUNDS_SHEET: Final = Sheet(
@@ -147,19 +157,7 @@ ROUNDS_SHEET: Final = Sheet(
             "true/false",
             "the stored actions replay to the stored end; if not, the measures are empty",
         ),
-        *_chef("human"),
-        *_chef("partner"),
-        Field("concurrent_ticks", "whole number", "ticks in which neither action was stay"),
-        Field(
-            "stuck_ticks",
-            "whole number",
-            "ticks, from the second on, in which no chef had moved or turned since",
-        ),
-        Field(
-            "performance",
-            "number",
-            "deliveries weighed by how early they came, from 0 to 1 of the best thinkable",
-        ),
+        *MEASURES,
     ),
 )
 

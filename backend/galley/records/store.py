@@ -13,10 +13,12 @@ from typing import Any, Self, TypeVar
 from sqlalchemy import Connection, Engine
 
 from galley.errors import GalleyError
+from galley.kitchen.trajectory import Trajectory
 from galley.records import jobs, queries
 from galley.records.engine import connect, database_url, sqlite_file
 from galley.records.lock import ServingLock
 from galley.records.migrate import migrate
+from galley.records.replay import trajectory_of
 from galley.records.rows import ClockRow, Health, KeyRow, PauseRow, RoundRow, TickRow, VisitRow
 from galley.records.writer import FLUSH_EVERY_S, Journal, Writer
 from galley.study.questionnaire import Questionnaire
@@ -230,6 +232,14 @@ class Store:
     def health(self) -> Health:
         """Whether what is journalled reaches the database."""
         return self._writer.health()
+
+    def trajectory(self, round_id: int) -> Trajectory:
+        """A round as far as it is committed, ready to be replayed.
+
+        Raises: GalleyError if there is no such round, or what is stored cannot be played.
+        """
+        with self.reading() as connection:
+            return trajectory_of(queries.round_row(connection, round_id))
 
     @contextmanager
     def reading(self) -> Iterator[Connection]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from galley.errors import GalleyError
 from galley.kitchen import STAY
@@ -73,7 +74,7 @@ def verify_study(store: Store, study: str) -> VerifyReport:
     return VerifyReport(rounds, ticks, still_open, tuple(faults))
 
 
-def _problems(row: RoundRow, ticks: list[dict[str, object]]) -> tuple[str, ...]:
+def _problems(row: RoundRow, ticks: list[dict[str, Any]]) -> tuple[str, ...]:
     agents = [seat.seat for seat in row.seats if seat.agent is not None]
     moved = [
         f"tick {tick['tick']}: the agent of seat {seat} was late or at fault, yet its action is not stay"
@@ -82,7 +83,7 @@ def _problems(row: RoundRow, ticks: list[dict[str, object]]) -> tuple[str, ...]:
         if (tick["late"] or tick["fault"] is not None) and tick[f"action_{seat}"] != STAY
     ]
     try:
-        replay = replay_round(row, tuple(int(str(tick["tick"])) for tick in ticks))
+        replay = replay_round(row, [tick["tick"] for tick in ticks])
     except GalleyError as error:
         return (str(error).removeprefix(f"round {row.id}: "), *moved)
     return (*replay.problems, *moved)
