@@ -1,0 +1,289 @@
+"""Joint motion of two chefs, compiled: tables of costs per pair of goals, filled when first asked for.
+
+A table is found by breadth-first search backwards from its goals. Facings need not be searched: a chef
+that still has to act may face anywhere, one that has settled at its goal only stays. So a chef is in one
+of F + 4 states, F floor cells or settled at one of at most 4 goal poses, which is 16 times fewer joint
+states than joint poses, and exact (`tests/planning/test_joint_motion.py` compares with joint poses).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy import int16, int32
+from numpy.typing import NDArray
+
+from galley.kitchen.codes import STAY
+
+FAR = 32000
+"""The cost of what cannot be reached."""
+FREE = 0
+"""The goal of a chef that may end anywhere."""
+MOST_POSES = 4
+NONE = -1
+
+
+class JointTables(NamedTuple):
+    """Arrays of one layout; F floor cells in row-major order, C cells, goals G = 1 + C + 4 F.
+
+    Goal 0 is free, goal 1 + cell is to face that tile, goal 1 + C + 4 * floor + facing is that pose.
+    `tables` int16[K, F + 4, F + 4] hold the K pairs of goals asked for most recently.
+    """
+
+    floor_of: NDArray[int16]  # [C], -1 where there is no floor
+    cell_of: NDArray[int16]  # [F]
+    ahead: NDArray[int16]  # [F, 4], floor number or -1
+    faced: NDArray[int16]  # [F, 4], cell
+    slot: NDArray[int32]  # [G, G], -1 when not filled
+    pair: NDArray[int32]  # [K, 2], the goals of a slot
+    used: NDArray[int32]  # [1], tables filled so far
+    tables: NDArray[int16]
+    queue: NDArray[int32]  # [(F + 4)^2], space to work in
+
+
+@njit(cache=True)
+def poses_of(joint: JointTables, goal: int, poses: NDArray[int16]) -> int:
+    """How many poses (4 * floor + facing) end a goal; they are written to `poses` int16[4]."""
+    cells = joint.floor_of.size
+    count = 0
+    if goal == FREE:
+        return 0
+    if goal > cells:
+        poses[0] = goal - 1 - cells
+        return 1
+    for floor in range(joint.cell_of.size):
+        for facing in range(STAY):
+            if joint.faced[floor, facing] == goal - 1 and count < MOST_POSES:
+                poses[count] = 4 * floor + facing
+                count += 1
+    return count
+
+
+@njit(cache=True)
+def _before(
+    joint: JointTables, poses: NDArray[int16], state: int, bumps: bool, found: NDArray[int16]
+) -> int:
+    """How many (state, action) of one chef may lead to `state`; written to `found` int16[9, 2]."""
+    floors = joint.cell_of.size
+    found[0, 0] = state
+    found[0, 1] = STAY
+    count = 1
+    if state >= floors:
+        floor = poses[state - floors] // 4
+        facing = poses[state - floors] % 4
+        behind = joint.ahead[floor, facing ^ 1]
+        if behind >= 0:
+            found[count, 0] = behind
+            found[count, 1] = facing
+            count += 1
+        if joint.ahead[floor, facing] < 0 or bumps:
+            found[count, 0] = floor
+            found[count, 1] = facing
+            count += 1
+        return count
+    for facing in range(STAY):
+        behind = joint.ahead[state, facing ^ 1]
+        if behind >= 0:
+            found[count, 0] = behind
+            found[count, 1] = facing
+            count += 1
+        if bumps and joint.ahead[state, facing] >= 0:
+            found[count, 0] = state
+            found[count, 1] = facing
+            count += 1
+    return count
+
+
+@njit(cache=True)
+def _faces_floor(joint: JointTables, poses: NDArray[int16], count: int) -> bool:
+    for index in range(count):
+        if joint.ahead[poses[index] // 4, poses[index] % 4] >= 0:
+            return True
+    return False
+
+
+@njit(cache=True)
+def _fill(joint: JointTables, goal0: int, goal1: int, table: NDArray[int16]) -> None:
+    """Nothing; `table` int16[F + 4, F + 4] becomes the fewest ticks until both goals hold at once."""
+    floors = joint.cell_of.size
+    size = floors + MOST_POSES
+    poses0 = np.zeros(MOST_POSES, dtype=np.int16)
+    poses1 = np.zeros(MOST_POSES, dtype=np.int16)
+    count0 = poses_of(joint, goal0, poses0)
+    count1 = poses_of(joint, goal1, poses1)
+    bumps = _faces_floor(joint, poses0, count0) or _faces_floor(joint, poses1, count1)
+    cell0 = np.arange(size).astype(np.int16)
+    cell1 = cell0.copy()
+    for index in range(count0):
+        cell0[floors + index] = poses0[index] // 4
+    for index in range(count1):
+        cell1[floors + index] = poses1[index] // 4
+    table[:] = FAR
+    queue = joint.queue
+    last = 0
+    first0, end0 = (0, floors) if goal0 == FREE else (floors, floors + count0)
+    first1, end1 = (0, floors) if goal1 == FREE else (floors, floors + count1)
+    for s0 in range(first0, end0):
+        for s1 in range(first1, end1):
+            if cell0[s0] != cell1[s1]:
+                table[s0, s1] = 0
+                queue[last] = s0 * size + s1
+                last += 1
+    # What may lead to each state, written down once: [state, which, (state, action)].
+    ways0 = np.zeros((size, 9, 2), dtype=np.int16)
+    ways1 = np.zeros((size, 9, 2), dtype=np.int16)
+    number0 = np.zeros(size, dtype=np.int16)
+    number1 = np.zeros(size, dtype=np.int16)
+    for state in range(floors + count0):
+        number0[state] = _before(joint, poses0, state, bumps, ways0[state])
+    for state in range(floors + count1):
+        number1[state] = _before(joint, poses1, state, bumps, ways1[state])
+    first = 0
+    while first < last:
+        s0 = queue[first] // size
+        s1 = queue[first] % size
+        first += 1
+        cost = table[s0, s1] + 1
+        for i in range(number0[s0]):
+            from0 = ways0[s0, i, 0]
+            act0 = ways0[s0, i, 1]
+            at0 = cell0[from0]
+            to0 = at0
+            if act0 < STAY and joint.ahead[at0, act0] >= 0:
+                to0 = joint.ahead[at0, act0]
+            for j in range(number1[s1]):
+                from1 = ways1[s1, j, 0]
+                if table[from0, from1] != FAR:
+                    continue
+                at1 = cell1[from1]
+                if at0 == at1:
+                    continue
+                act1 = ways1[s1, j, 1]
+                to1 = at1
+                if act1 < STAY and joint.ahead[at1, act1] >= 0:
+                    to1 = joint.ahead[at1, act1]
+                if to0 == to1 or (to0 == at1 and to1 == at0):
+                    fits = at0 == cell0[s0] and at1 == cell1[s1]
+                else:
+                    fits = to0 == cell0[s0] and to1 == cell1[s1]
+                if fits:
+                    table[from0, from1] = cost
+                    queue[last] = from0 * size + from1
+                    last += 1
+
+
+@njit(cache=True)
+def table_of(joint: JointTables, goal0: int, goal1: int) -> int:
+    """The slot of the table for a pair of goals, filled now if need be; the oldest gives way when all are used."""
+    slot = joint.slot[goal0, goal1]
+    if slot >= 0:
+        return int(slot)
+    slots = joint.tables.shape[0]
+    slot = joint.used[0] % slots
+    if joint.used[0] >= slots:
+        joint.slot[joint.pair[slot, 0], joint.pair[slot, 1]] = NONE
+    joint.used[0] += 1
+    if joint.used[0] >= 2 * slots:  # keep the count from overflowing; all slots stay in use
+        joint.used[0] -= slots
+    _fill(joint, goal0, goal1, joint.tables[slot])
+    joint.slot[goal0, goal1] = slot
+    joint.pair[slot, 0] = goal0
+    joint.pair[slot, 1] = goal1
+    return int(slot)
+
+
+@njit(cache=True)
+def _settled(joint: JointTables, goal: int, pose: int) -> int:
+    """The state of a chef that has settled at `pose`, or -1 if that pose does not end its goal."""
+    cells = joint.floor_of.size
+    if goal == FREE:
+        return NONE
+    if goal > cells:
+        return joint.cell_of.size if pose == goal - 1 - cells else NONE
+    if joint.faced[pose // 4, pose % 4] != goal - 1:
+        return NONE
+    poses = np.zeros(MOST_POSES, dtype=np.int16)
+    count = poses_of(joint, goal, poses)
+    for index in range(count):
+        if poses[index] == pose:
+            return int(joint.cell_of.size + index)
+    return NONE
+
+
+@njit(cache=True)
+def joint_cost(joint: JointTables, goal0: int, goal1: int, pose0: int, pose1: int) -> int:
+    """The fewest ticks from poses (4 * floor + facing) until both goals hold at once; FAR if never."""
+    if goal0 == FREE and goal1 == FREE:
+        return 0
+    table = joint.tables[table_of(joint, goal0, goal1)]
+    s0 = _settled(joint, goal0, pose0)
+    s1 = _settled(joint, goal1, pose1)
+    best = table[pose0 // 4, pose1 // 4]
+    if s0 >= 0:
+        best = min(best, table[s0, pose1 // 4])
+    if s1 >= 0:
+        best = min(best, table[pose0 // 4, s1])
+        if s0 >= 0:
+            best = min(best, table[s0, s1])
+    return int(best)
+
+
+@njit(cache=True)
+def moved(joint: JointTables, pose0: int, pose1: int, act0: int, act1: int) -> tuple[int, int]:
+    """The poses after one tick in which the chefs move or stay, as `galley.kitchen.rules` has it."""
+    at0 = pose0 // 4
+    at1 = pose1 // 4
+    facing0 = act0 if act0 < STAY else pose0 % 4
+    facing1 = act1 if act1 < STAY else pose1 % 4
+    to0 = at0
+    to1 = at1
+    if act0 < STAY and joint.ahead[at0, act0] >= 0:
+        to0 = joint.ahead[at0, act0]
+    if act1 < STAY and joint.ahead[at1, act1] >= 0:
+        to1 = joint.ahead[at1, act1]
+    if to0 == to1 or (to0 == at1 and to1 == at0):
+        to0 = at0
+        to1 = at1
+    return 4 * to0 + facing0, 4 * to1 + facing1
+
+
+@njit(cache=True)
+def _alone(joint: JointTables, costs: NDArray[int16], goal: int, pose: int) -> int:
+    """The fewest actions to a tile that is a goal, the other chef left out; 0 for other goals."""
+    if goal == FREE or goal > joint.floor_of.size:
+        return 0
+    cost = costs[4 * joint.cell_of[pose // 4] + pose % 4, goal - 1]
+    return FAR if cost < 0 else int(cost)
+
+
+@njit(cache=True)
+def joint_step(
+    joint: JointTables, costs: NDArray[int16], goal0: int, goal1: int, pose0: int, pose1: int, first: int
+) -> int:
+    """8 * action of seat 0 + action of seat 1: the first tick of a joint plan; stay for both if there is none.
+
+    Among plans of fewest ticks: the chef of seat `first` as near its goal as can be, then the other,
+    then the fewest moves, then the first in the order of action codes. `costs` are those of `distances`.
+    """
+    cost = joint_cost(joint, goal0, goal1, pose0, pose1)
+    best = STAY * 8 + STAY
+    if cost == 0 or cost >= FAR:
+        return best
+    score = np.int64(1) << 60
+    for act0 in range(STAY + 1):
+        for act1 in range(STAY + 1):
+            new0, new1 = moved(joint, pose0, pose1, act0, act1)
+            left = joint_cost(joint, goal0, goal1, new0, new1)
+            if left != cost - 1:
+                continue
+            near0 = np.int64(_alone(joint, costs, goal0, new0))
+            near1 = np.int64(_alone(joint, costs, goal1, new1))
+            mine, others = (near0, near1) if first == 0 else (near1, near0)
+            moves = (act0 < STAY) + (act1 < STAY)
+            this = (mine * 65536 + others) * 4 + moves
+            if this < score:
+                score = this
+                best = 8 * act0 + act1
+    return best
