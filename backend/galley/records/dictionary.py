@@ -1,9 +1,13 @@
-"""The data dictionary: what every exported column and every column of the database means."""
+"""The data dictionary: what every exported column and every column of the database means.
+
+`python -m galley.records.dictionary > docs/data-dictionary.md` brings the page in the docs up to date.
+"""
 
 from __future__ import annotations
 
 import csv
 import io
+import sys
 from collections.abc import Iterator
 
 from galley.records.sheets import SHEETS
@@ -70,3 +74,7 @@ def _tables() -> Iterator[str]:
 
 def _line(name: str, kind: str, meaning: str) -> str:
     return f"| `{name}` | {kind} | {meaning.replace('|', chr(92) + '|')} |"
+
+
+if __name__ == "__main__":
+    sys.stdout.write(dictionary_markdown())

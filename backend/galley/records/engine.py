@@ -41,20 +41,25 @@ def sqlite_file(url: URL) -> Path | None:
     return Path(str(url.database)) if url.get_backend_name() == "sqlite" else None
 
 
-def connect(url: URL, *, writes: bool) -> Engine:
-    """An engine on `url`; one that does not write refuses to.
+def shown(url: URL) -> str:
+    """What messages call the database: its file, or its URL without the password."""
+    return str(sqlite_file(url) or url.render_as_string())
+
+
+def connect(url: URL, *, writes: bool, migrates: bool = False) -> Engine:
+    """An engine on `url`; one that does not write refuses to, one that migrates may rebuild tables.
 
     Raises: GalleyError if the driver is missing.
     """
     try:
         if url.get_backend_name() == "sqlite":
-            return _sqlite(url, writes)
+            return _sqlite(url, writes, migrates)
         return create_engine(url, pool_pre_ping=True)
     except (NoSuchModuleError, ModuleNotFoundError) as missing:
-        raise GalleyError(f"database {url.render_as_string()}: {missing}; pip install the driver") from None
+        raise GalleyError(f"database {shown(url)}: {missing}; pip install the driver") from None
 
 
-def _sqlite(url: URL, writes: bool) -> Engine:
+def _sqlite(url: URL, writes: bool, migrates: bool) -> Engine:
     engine = create_engine(url, connect_args={"timeout": BUSY_MS / 1000, "check_same_thread": False})
 
     @event.listens_for(engine, "connect")
@@ -64,7 +69,8 @@ def _sqlite(url: URL, writes: bool) -> Engine:
         for pragma in (
             "journal_mode = WAL",
             "synchronous = FULL",
-            "foreign_keys = ON",
+            # A migration may rebuild a table; to drop the old one must not delete what points at it.
+            f"foreign_keys = {'OFF' if migrates else 'ON'}",
             f"query_only = {'OFF' if writes else 'ON'}",
         ):
             connection.execute(f"PRAGMA {pragma}")

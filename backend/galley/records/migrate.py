@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 
 from alembic import command
@@ -9,9 +10,11 @@ from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from sqlalchemy import Connection, Engine, inspect, text
+from sqlalchemy.engine import URL
 from sqlalchemy.exc import DatabaseError
 
 from galley.errors import GalleyError
+from galley.records.engine import connect, shown, sqlite_file
 from galley.records.lock import ServingLock
 
 SCRIPTS = Path(__file__).parent / "migrations"
@@ -19,26 +22,27 @@ SCRIPTS = Path(__file__).parent / "migrations"
 ADVISORY_LOCK = 7_405_926_117
 
 
-def migrate(engine: Engine, name: str, file: Path | None, *, locked: bool, scripts: Path = SCRIPTS) -> None:
+def migrate(url: URL, *, locked: bool, scripts: Path = SCRIPTS) -> None:
     """Run every migration that is still missing, all in one transaction.
 
-    `name` is what messages call the database, `file` its SQLite file, `locked` whether it is locked already.
+    `locked` tells whether the serving lock of an SQLite file is held already.
     Raises: GalleyError if the database is newer than this Galley, is not Galley's, or is being served.
     """
     config = Config()
     config.set_main_option("script_location", str(scripts).replace("%", "%%"))
     directory = ScriptDirectory.from_config(config)
+    file = sqlite_file(url)
+    engine = connect(url, writes=True, migrates=True)
     try:
         with engine.connect() as connection:
-            if _is_current(connection, name, directory):
+            if _is_current(connection, shown(url), directory):
                 return
-        if file is None or locked:
-            _upgrade(engine, name, directory, config)
-        else:
-            with ServingLock(file):
-                _upgrade(engine, name, directory, config)
+        with ServingLock(file) if file is not None and not locked else nullcontext():
+            _upgrade(engine, shown(url), directory, config)
     except DatabaseError as error:
-        raise GalleyError(f"{name}: cannot be opened as records: {error.orig}") from None
+        raise GalleyError(f"{shown(url)}: cannot be opened as records: {error.orig}") from None
+    finally:
+        engine.dispose()
 
 
 def _is_current(connection: Connection, name: str, directory: ScriptDirectory) -> bool:
@@ -59,3 +63,9 @@ def _upgrade(engine: Engine, name: str, directory: ScriptDirectory, config: Conf
         if not _is_current(connection, name, directory):  # another process may have been first
             config.attributes["connection"] = connection
             command.upgrade(config, "head")
+        if connection.dialect.name == "sqlite" and (broken := _pointing_nowhere(connection)):
+            raise GalleyError(f"{name}: migrating it would leave rows of {broken} that point nowhere")
+
+
+def _pointing_nowhere(connection: Connection) -> str:
+    return " ".join(sorted({row[0] for row in connection.exec_driver_sql("PRAGMA foreign_key_check")}))

@@ -15,7 +15,7 @@ from sqlalchemy import Connection, Engine
 from galley.errors import GalleyError
 from galley.kitchen.trajectory import Trajectory
 from galley.records import jobs, queries
-from galley.records.engine import connect, database_url, sqlite_file
+from galley.records.engine import connect, database_url, shown, sqlite_file
 from galley.records.lock import ServingLock
 from galley.records.migrate import migrate
 from galley.records.replay import trajectory_of
@@ -60,28 +60,25 @@ class Store:
         """
         url = database_url(database)
         file = sqlite_file(url)
-        name = str(file or url.render_as_string())
         if must_exist and file is not None and not file.is_file():
             raise GalleyError(
-                f"{name}: there is no such database; name the one that was served with --database"
+                f"{file}: there is no such database; name the one that was served with --database"
             )
+        lock = None
         try:
             if file is not None:
                 file.parent.mkdir(parents=True, exist_ok=True)
-            lock = ServingLock(file) if serving and file is not None else None
-        except OSError as error:
-            raise GalleyError(
-                f"{name}: {error.strerror or error}; name another database with --database"
-            ) from None
-        engine = connect(url, writes=True)
-        try:
-            migrate(engine, name, file, locked=lock is not None)
-        except BaseException:
-            engine.dispose()
+                lock = ServingLock(file) if serving else None
+            migrate(url, locked=lock is not None)
+        except BaseException as error:
             if lock is not None:
                 lock.release()
+            if isinstance(error, OSError):
+                fix = "name another database with --database"
+                raise GalleyError(f"{file}: {error.strerror or error}; {fix}") from None
             raise
-        return cls(name, engine, connect(url, writes=False), lock, flush_every_s)
+        reader = connect(url, writes=False)
+        return cls(shown(url), connect(url, writes=True), reader, lock, flush_every_s)
 
     # ---- visits --------------------------------------------------------------------------------------------
 
