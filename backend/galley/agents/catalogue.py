@@ -5,7 +5,8 @@ from __future__ import annotations
 from galley.agents.bundle import Bundle, load_bundle
 from galley.agents.trial import trial
 from galley.errors import InvalidFiles, Problem
-from galley.kitchen.layout_file import load_layouts
+from galley.kitchen import Layout
+from galley.kitchen.layout_file import load_layout
 from galley.names import name_fix
 from galley.workspace import Workspace
 
@@ -36,25 +37,35 @@ class Catalogue:
     def check(self) -> list[Problem]:
         """All problems of all bundles: their files, and how they play on every layout that they name.
 
-        Wrong layout files are told too, since agents cannot be tried on them.
+        Wrong layout files are told too, since no agent can be tried on them.
         """
-        problems: list[Problem] = []
-        try:
-            layouts = load_layouts(self._workspace)
-        except InvalidFiles as error:
-            return list(error.problems)
-        distinct = {layout.name: layout for layout in layouts.values()}
+        layouts, problems = self._layouts()
         for name in self.names():
             try:
                 bundle = self.bundle(name)
             except InvalidFiles as error:
                 problems += error.problems
                 continue
-            for layout_name in distinct if bundle.layouts is None else bundle.layouts:
-                if layout_name in distinct:
-                    problems += trial(bundle, distinct[layout_name]).problems
-                else:
+            for layout_name in layouts if bundle.layouts is None else bundle.layouts:
+                if layout_name not in layouts:
                     told = f"layout '{layout_name}' is not in the workspace"
                     place = ("layouts", layout_name)
-                    problems.append(bundle.loaded.problem(place, told, name_fix(layout_name, distinct)))
+                    problems.append(bundle.loaded.problem(place, told, name_fix(layout_name, layouts)))
+                    continue
+                layout = layouts[layout_name]
+                if layout is not None:
+                    problems += trial(bundle, layout).problems
         return problems
+
+    def _layouts(self) -> tuple[dict[str, Layout | None], list[Problem]]:
+        """The layouts of the workspace by name, None for those whose files are wrong, and what is wrong."""
+        layouts: dict[str, Layout | None] = {}
+        problems: list[Problem] = []
+        for name in self._workspace.names("layouts"):
+            path = self._workspace.find("layouts", name)
+            try:
+                layouts[name] = load_layout(path, self._workspace.shown(path))
+            except InvalidFiles as error:
+                layouts[name] = None
+                problems += error.problems
+        return layouts, problems

@@ -53,7 +53,7 @@ layouts:
 def learn_bc(
     workspace: Path,
     *,
-    data: Path,
+    data: Path | None = None,
     split: Split,
     seed: int = 0,
     games: int = 100,
@@ -63,15 +63,15 @@ def learn_bc(
     """What came out on each layout; writes clones of one split of the human data as a bundle with its card.
 
     `data` is `clean_train_trials.pickle` or `clean_test_trials.pickle` of the `overcooked-ai` 1.1.0 package,
-    or a folder that holds them. The bundle goes to `out`, by default `agents/human-bc` (train) or
-    `agents/human-proxy` (test) of the workspace. Each clone plays `games` games with itself; `tell` gets
-    lines about the progress.
+    or a folder that holds them, by default `.cache/overcooked-ai` of the workspace. The bundle goes to `out`,
+    by default `agents/human-bc` (train) or `agents/human-proxy` (test) of the workspace. Each clone plays
+    `games` games with itself; `tell` gets lines about the progress.
 
     Raises:
         GalleyError: the data cannot be found or read.
     """
-    path = find_pickle(data, split)
     place = Workspace(workspace)
+    path = find_pickle(data or place.path / ".cache" / "overcooked-ai", split)
     folder = out or place.folder("agents") / BUNDLES[split]
     recorded: dict[str, list[HumanGame]] = {}
     for game in human_games(path):

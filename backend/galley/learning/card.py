@@ -78,8 +78,8 @@ def card(
   {version("galley")}. With the same version of PyTorch and kind of processor it gives the same files.
 - **Method**: behaviour cloning on the encoding `overcooked-2019-features`: an MLP {widths} (tanh),
   cross-entropy, Adam {settings.learning_rate:g}, batches of {settings.batch} rows, {settings.held_out:.0%} of
-  the rows held out at random, the weights after the last epoch. All constants are those of Carroll et al. 2019
-  and its code; the seed is ours.
+  the rows held out at random, the weights after the last epoch. All constants are those of Carroll et al.
+  2019 and its code; the seed is ours.
 - **Acting**: actions are sampled; stuck for 3 ticks, the actions of those ticks are barred.
 
 | layout | rows | epochs | accuracy trained | accuracy held out | loss held out | score | published |
