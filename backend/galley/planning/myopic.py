@@ -8,25 +8,11 @@ from numpy.typing import NDArray
 from galley.kitchen import ACTIONS, Layout
 from galley.kitchen.codes import TICK
 from galley.planning.distances import distances
-from galley.planning.myopic_kernel import (
-    KNOWN,
-    MEMORY_SIZE,
-    OTHER_ACTION,
-    OTHER_CELL,
-    OWN_ACTION,
-    OWN_CELL,
-    OWN_FACING,
-    WANDERS,
-    decide,
-    stuck,
-)
+from galley.planning.myopic_kernel import MEMORY_SIZE, decide, remember
 from galley.randomness import uniform
 
-_UNSTUCK, _NOISE, _NOISY_ACTION, _LENGTH = range(4)
+UNSTUCK, NOISE, NOISY_ACTION, LENGTH = range(4)
 """Streams of random numbers."""
-
-MOST_WANDERS = 4
-"""A stuck chef makes 1 to this many random moves in a row, so that two in a corridor get past each other."""
 
 
 class Myopic:
@@ -71,22 +57,13 @@ class Myopic:
 
     def act(self, state: NDArray[np.int16], tick: int) -> int:
         """The first action of the shortest way to the present subtask, or a random one."""
-        if self.epsilon > 0 and uniform(self._seed, self._seat, tick, _NOISE) < self.epsilon:
-            return int(uniform(self._seed, self._seat, tick, _NOISY_ACTION) * len(ACTIONS))
-        draw = uniform(self._seed, self._seat, tick, _UNSTUCK)
+        if self.epsilon > 0 and uniform(self._seed, self._seat, tick, NOISE) < self.epsilon:
+            return int(uniform(self._seed, self._seat, tick, NOISY_ACTION) * len(ACTIONS))
+        draw = uniform(self._seed, self._seat, tick, UNSTUCK)
         return int(decide(self._spec, self._costs, self._reach, state, self._seat, self._memory, draw))
 
     def observe(self, state: NDArray[np.int16], joint_action: tuple[int, int]) -> None:
         """Note where both stood and what both did."""
-        own, other = 3 * self._seat, 3 * (1 - self._seat)
-        memory = self._memory
-        if stuck(state, self._seat, memory):
-            draw = uniform(self._seed, self._seat, int(state[TICK]), _LENGTH)
-            memory[WANDERS] = int(draw * MOST_WANDERS)
-        elif memory[WANDERS] > 0:
-            memory[WANDERS] -= 1
-        memory[KNOWN] = 1
-        memory[OWN_CELL], memory[OWN_FACING] = state[own], state[own + 1]
-        memory[OWN_ACTION] = joint_action[self._seat]
-        memory[OTHER_CELL] = state[other]
-        memory[OTHER_ACTION] = joint_action[1 - self._seat]
+        seat = self._seat
+        draw = uniform(self._seed, seat, int(state[TICK]), LENGTH)
+        remember(state, seat, self._memory, joint_action[seat], joint_action[1 - seat], draw)

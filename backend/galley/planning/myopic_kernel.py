@@ -49,6 +49,9 @@ OTHER_ACTION = 5
 WANDERS = 6  # random moves still to make, once stuck
 MEMORY_SIZE = 7
 
+MOST_WANDERS = 4
+"""A stuck chef makes 1 to this many random moves in a row, so that two in a corridor get past each other."""
+
 NOWHERE = -1
 
 
@@ -438,3 +441,20 @@ def decide(
         return action
     move = _wander(spec, state, seat, back, draw)
     return action if move == NOWHERE else move
+
+
+@njit(cache=True)
+def remember(
+    state: NDArray[int16], seat: int, memory: NDArray[int16], own_action: int, other_action: int, draw: float
+) -> None:
+    """Nothing; notes in `memory` what both did in `state`; `draw` in [0, 1) settles how long one who is stuck wanders."""
+    if stuck(state, seat, memory):
+        memory[WANDERS] = int(draw * MOST_WANDERS)
+    elif memory[WANDERS] > 0:
+        memory[WANDERS] -= 1
+    memory[KNOWN] = 1
+    memory[OWN_CELL] = state[CHEF * seat + CELL]
+    memory[OWN_FACING] = state[CHEF * seat + FACING]
+    memory[OWN_ACTION] = own_action
+    memory[OTHER_CELL] = state[CHEF * (1 - seat) + CELL]
+    memory[OTHER_ACTION] = other_action
