@@ -17,6 +17,9 @@ const STAND = 0.9;
 const FEET = 1.31;
 const SHRINK = 0.95;
 
+/** From this tick on a participant knows which chef is theirs. */
+const ALREADY_KNOWN_TICKS = 14;
+
 /** Where a held thing's middle is in a chef's drawing, in tiles, and its size, by facing N S E W. */
 const HANDS = /** @type {const} */ ([[0.83, 0.9], [0.5, 1.1], [0.8, 1.05], [0.2, 1.05]]);
 const HELD_SIZE = 0.86;
@@ -53,7 +56,7 @@ export function draw(context, board, sprites, kitchen, now) {
   layers.sort((a, b) => a[0] - b[0]);
   for (const [, layer] of layers) layer();
   for (const effect of board.effects) drawEffect(context, board, effect, s, now, quiet);
-  if (board.phase !== "playing" || board.tick < 14) pointer(context, seen[board.seat] ?? [0, 0], s, now, quiet);
+  if (board.phase === "playing" ? board.tick < ALREADY_KNOWN_TICKS : board.phase !== "ended") pointer(context, seen[board.seat] ?? [0, 0], s, now, quiet);
 }
 
 /** @param {Chef} chef @param {number} now @param {number} tickMs @param {boolean} quiet @returns {[number, number]} */

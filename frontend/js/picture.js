@@ -7,6 +7,7 @@ import { HATS, Sprites, loadImages, newCanvas } from "./sprites.js";
 import { tileFor } from "./view.js";
 
 /** @typedef {import("./wire.js").ChefRow} ChefRow */
+/** @typedef {import("./wire.js").PotRow} PotRow */
 
 const TALLEST_PX = 420;
 const LARGEST_TILE = 84;
@@ -27,6 +28,16 @@ function starts(rows) {
   return first && second ? [first, second] : null;
 }
 
+/**
+ * The pots of a kitchen: empty, or in the middle of work.
+ * @param {string[]} grid @param {boolean} busy
+ * @returns {PotRow[]}
+ */
+function potsOf(grid, busy) {
+  const places = grid.flatMap((row, y) => [...row].flatMap((tile, x) => (tile === "P" ? [[x, y]] : [])));
+  return places.map(([x = 0, y = 0], i) => (busy ? [x, y, 1, 3, i % 2 ? 20 : 13, i % 2 === 1] : [x, y, 0, 0, 0, false]));
+}
+
 /** @param {HTMLElement} figure @param {Map<string, HTMLImageElement>} images */
 function redraw(figure, images) {
   const tiles = figure.querySelector(".kitchen-tiles");
@@ -40,10 +51,11 @@ function redraw(figure, images) {
   const kitchen = still(grid, sprites);
   const { canvas, context } = newCanvas(kitchen.width, kitchen.height);
   const hats = /** @type {[string, string]} */ ([figure.dataset.hat ?? WORDS[4], figure.dataset.partnerHat ?? WORDS[0]]);
-  const pots = grid.flatMap((row, y) => [...row].flatMap((tile, x) =>
-    tile === "P" ? [/** @type {import("./wire.js").PotRow} */ ([x, y, 0, 0, 0, false])] : []));
+  const busy = figure.dataset.scene === "busy";
+  const pots = potsOf(grid, busy);
+  if (busy) Object.assign(chefs, { 0: [chefs[0][0], chefs[0][1], 2, 1], 1: [chefs[1][0], chefs[1][1], 1, 4] });
   draw(context, boardFrom({
-    type: "keyframe", phase: "ended", tick: 99, horizon: 99, tick_ms: 150, seat: 0, hats, grid, cook_time: 20, chefs,
+    type: "keyframe", phase: "waiting", tick: 99, horizon: 99, tick_ms: 150, seat: 0, hats, grid, cook_time: 20, chefs,
     things: [], pots, score: 0, goal: null, round: 1, of: 1, tutorial: false, orders: null,
   }), sprites, kitchen, 0);
   canvas.className = "kitchen-canvas";

@@ -74,6 +74,7 @@ export class View {
     this.canvas.width = this.kitchen.width;
     this.canvas.height = this.kitchen.height;
     this.canvas.style.width = `${this.kitchen.width / density}px`;
+    document.documentElement.style.setProperty("--board", `${this.kitchen.width / density}px`);
     this.canvas.style.height = `${this.kitchen.height / density}px`;
   }
 }
