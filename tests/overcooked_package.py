@@ -1,4 +1,4 @@
-"""The `overcooked-ai` 1.1.0 package from PyPI, as data and as a peer to compare with; it is never a dependency.
+"""The `overcooked-ai` 1.1.0 package from PyPI, as data and as a peer to compare with, never a dependency.
 
 Run as a script it prints the folder of the human games: `python tests/overcooked_package.py`.
 """
@@ -40,7 +40,7 @@ def human_games_folder() -> Path:
 
 
 def mdp() -> Any:
-    """The package's module of rules and encodings, imported without the package's own start, which wants gym."""
+    """The package's rules and encodings, imported without running the package's start, which wants gym."""
     name = "overcooked_ai_py"
     if name not in sys.modules:
         package = types.ModuleType(name)

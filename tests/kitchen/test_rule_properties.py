@@ -74,7 +74,9 @@ def test_a_finished_kitchen_does_not_change(
 
 def plain(module: ModuleType) -> ModuleType:
     """The kernel file as plain Python."""
-    spec = importlib.util.spec_from_file_location(f"plain_{module.__name__.split('.')[-1]}", str(module.__file__))
+    spec = importlib.util.spec_from_file_location(
+        f"plain_{module.__name__.split('.')[-1]}", str(module.__file__)
+    )
     assert spec is not None
     assert spec.loader is not None
     copy = importlib.util.module_from_spec(spec)

@@ -52,31 +52,7 @@ def load_layout(path: Path, shown: str | None = None) -> Layout:
     Raises:
         InvalidFiles: all that is wrong with it, each with line and fix.
     """
-    file = load(path, LayoutFile, shown)
-    text = file.value.grid.rstrip("\n")
-    grid = tuple(text.split("\n"))
-    rules = file.value.rules
-    asked = Rules(
-        rules.rule_set, rules.cook_time_ticks, rules.delivery_reward, rules.horizon_ticks, rules.orders
-    )
-    problems = [
-        Problem(file.path, file.line("rules", key), *_message_and_fix(text))
-        for key, text in asked.problems().items()
-    ]
-    for number, alias in enumerate(file.value.aliases):
-        if not alias.strip():
-            problems.append(
-                file.problem(("aliases", number), "an alias is empty", "write a name or remove it")
-            )
-    drawn = grid_problems(grid)
-    problems += [Problem(file.path, _row_line(file, found.row), found.message, found.fix) for found in drawn]
-    if problems:
-        raise InvalidFiles(problems)
-    layout = Layout(path.stem, grid, asked, file.value.title, file.value.aliases, file.value.source)
-    problems = _station_problems(file, layout)
-    if problems:
-        raise InvalidFiles(problems)
-    return layout
+    return _read(path, shown)[1]
 
 
 def load_layouts(workspace: Workspace) -> dict[str, Layout]:
@@ -86,21 +62,20 @@ def load_layouts(workspace: Workspace) -> dict[str, Layout]:
         InvalidFiles: all that is wrong with any of them, or a name or alias taken twice.
     """
     problems: list[Problem] = []
-    layouts: dict[str, Layout] = {}
+    read: dict[str, tuple[Loaded[LayoutFile], Layout]] = {}
     for name in workspace.names("layouts"):
         path = workspace.find("layouts", name)
         try:
-            layouts[name] = load_layout(path, workspace.shown(path))
+            read[name] = _read(path, workspace.shown(path))
         except InvalidFiles as error:
             problems += error.problems
-    found = dict(layouts)
-    for layout in layouts.values():
-        for alias in layout.aliases:
-            if alias in found and found[alias] is not layout:
-                shown = workspace.shown(workspace.find("layouts", layout.name))
-                told = f"alias '{alias}' already belongs to layout {found[alias].name}"
-                problems.append(Problem(shown, None, told, "use another alias"))
-            found[alias] = layout
+    found = {name: layout for name, (_, layout) in read.items()}
+    for file, layout in read.values():
+        for number, alias in enumerate(layout.aliases):
+            taken = found.setdefault(alias, layout)
+            if taken is not layout:
+                told = f"alias '{alias}' already belongs to layout {taken.name}"
+                problems.append(file.problem(("aliases", number), told, "use another alias"))
     if problems:
         raise InvalidFiles(problems)
     return found
@@ -121,6 +96,33 @@ def find_layout(workspace: Workspace, name: str) -> Layout:
         place = workspace.shown(workspace.folder("layouts"))
         raise GalleyError(f"{place}: no layout is named '{name}'; {name_fix(name, tuple(layouts))}")
     return layouts[name]
+
+
+def _read(path: Path, shown: str | None) -> tuple[Loaded[LayoutFile], Layout]:
+    file = load(path, LayoutFile, shown)
+    grid = tuple(file.value.grid.rstrip("\n").split("\n"))
+    asked = file.value.rules
+    rules = Rules(
+        asked.rule_set, asked.cook_time_ticks, asked.delivery_reward, asked.horizon_ticks, asked.orders
+    )
+    problems = [
+        file.problem(("rules", key), *_message_and_fix(text)) for key, text in rules.problems().items()
+    ]
+    for number, alias in enumerate(file.value.aliases):
+        if not alias.strip():
+            problems.append(
+                file.problem(("aliases", number), "an alias is empty", "write a name or remove it")
+            )
+    problems += [
+        Problem(file.path, _row_line(file, found.row), found.message, found.fix)
+        for found in grid_problems(grid)
+    ]
+    if not problems:
+        layout = Layout(path.stem, grid, rules, file.value.title, file.value.aliases, file.value.source)
+        problems = _station_problems(file, layout)
+    if problems:
+        raise InvalidFiles(problems)
+    return file, layout
 
 
 def _message_and_fix(text: str) -> tuple[str, str]:
