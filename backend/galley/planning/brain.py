@@ -1,0 +1,130 @@
+"""What a planning robot works out about a layout before it acts."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from galley.errors import GalleyError
+from galley.kitchen.codes import (
+    COUNTER,
+    DISH_DISPENSER,
+    ONION_DISPENSER,
+    POT,
+    SERVING,
+    TOMATO_DISPENSER,
+)
+from galley.kitchen.layout import Layout
+from galley.planning.distances import Distances, distances
+from galley.planning.joint_motion import joint_tables
+from galley.planning.robot_kernel import Brain
+from galley.planning.solvable import require_solvable
+from galley.planning.value_kernel import (
+    AT_POT,
+    AT_SERVING,
+    FETCH_SOUP,
+    FILL_POT,
+    LEFTS,
+    MOST_SWEEPS,
+    PUT_DOWN,
+    SERVE,
+    STANDS,
+    TAKE_A_DISH,
+    TAKE_INGREDIENT,
+    TASKS,
+    UNABLE,
+    WITH_DISH,
+    WITH_INGREDIENT,
+    WITH_SOUP,
+    WORLDS,
+    iterate,
+)
+
+_STATIONS = {
+    TAKE_INGREDIENT: (ONION_DISPENSER, TOMATO_DISPENSER),
+    TAKE_A_DISH: (DISH_DISPENSER,),
+    FILL_POT: (POT,),
+    FETCH_SOUP: (POT,),
+    SERVE: (SERVING,),
+    PUT_DOWN: (COUNTER,),
+}
+"""The tiles at which each subtask of the value tables is done."""
+_PLACES = {
+    AT_POT: (POT,),
+    AT_SERVING: (SERVING,),
+    WITH_INGREDIENT: (ONION_DISPENSER, TOMATO_DISPENSER),
+    WITH_DISH: (DISH_DISPENSER,),
+    WITH_SOUP: (POT,),
+}
+"""Where a chef is at each stand."""
+
+
+def brain(layout: Layout, seat: int) -> Brain:
+    """All that a robot on `seat` needs to know of a layout; its joint motion tables are still empty.
+
+    Raises:
+        GalleyError: the layout cannot be served, is too large, or value iteration reached its limit.
+    """
+    known = distances(layout)
+    require_solvable(known)
+    robot_takes, human_takes = durations(known, seat), durations(known, 1 - seat)
+    needed = [
+        (AT_POT, TAKE_INGREDIENT), (AT_POT, TAKE_A_DISH), (WITH_INGREDIENT, FILL_POT), (WITH_DISH, FETCH_SOUP),
+        (WITH_SOUP, SERVE),
+    ]  # fmt: skip
+    passes = any(takes[one] >= UNABLE for takes in (robot_takes, human_takes) for one in needed)
+    longest = max(takes[takes < UNABLE].max(initial=1.0) for takes in (robot_takes, human_takes))
+    unit = max(1.0, float(longest) / (LEFTS - 1))
+    robot_next = np.zeros((STANDS, TASKS, LEFTS, WORLDS), dtype=np.float32)
+    human_next = np.zeros((TASKS, LEFTS, STANDS, WORLDS), dtype=np.float32)
+    pots = int((known.reachable.any(axis=0) & (layout.tiles.ravel() == POT)).sum())
+    if not passes:
+        sweeps = iterate(robot_takes, human_takes, pots, unit, robot_next, human_next)
+        if sweeps >= MOST_SWEEPS:
+            raise GalleyError(
+                f"layout {layout.name!r}: the robot's values did not settle in {MOST_SWEEPS} sweeps; "
+                "shorten the ways between its stations"
+            )
+    return Brain(
+        spec=layout.spec,
+        costs=known.costs,
+        reach=known.reachable,
+        joint=joint_tables(layout),
+        robot_next=robot_next,
+        human_next=human_next,
+        human_takes=human_takes,
+        unit=np.array([unit]),
+        pots=np.array([pots, int(passes)]),
+    )
+
+
+def durations(known: Distances, seat: int) -> NDArray[np.float64]:
+    """float64[STANDS, TASKS]: the ticks each subtask takes from each stand, `UNABLE` where it cannot be done.
+
+    A mean over the poses at which the stand's stations are faced, of the way to the nearest station of the
+    subtask, and one tick to interact. To fetch a soup takes at least what remains of its cooking if a
+    dish was taken at once.
+    """
+    layout = known.layout
+    tiles = layout.tiles.ravel()
+    start = 4 * layout.cell(layout.starts[seat])
+    costs = known.costs[_own_poses(known, start)]
+    found = np.full((STANDS, TASKS), UNABLE)
+    for stand, here in _PLACES.items():
+        beside = costs[(costs[:, np.isin(tiles, here)] == 0).any(axis=1)]
+        for task, there in _STATIONS.items():
+            ways = beside[:, np.isin(tiles, there)]
+            ways = np.where(ways < 0, np.int16(UNABLE), ways)
+            if ways.size and ways.min() < UNABLE:
+                found[stand, task] = ways.min(axis=1).mean() + 1
+    cooking = layout.rules.cook_time_ticks - found[AT_POT, TAKE_A_DISH]
+    if found[AT_POT, TAKE_A_DISH] < UNABLE and found[WITH_DISH, FETCH_SOUP] < UNABLE:
+        found[WITH_DISH, FETCH_SOUP] = max(found[WITH_DISH, FETCH_SOUP], cooking)
+    return found
+
+
+def _own_poses(known: Distances, start: int) -> NDArray[np.bool_]:
+    """bool[P]: the poses from which exactly what the chef at pose `start` can face can be faced."""
+    can = known.costs >= 0
+    same: NDArray[np.bool_] = (can == can[start]).all(axis=1)
+    return same
