@@ -1,4 +1,4 @@
-"""A real `galley serve` in a process of its own, for tests that ask it things from outside."""
+"""Real `galley` commands in processes of their own, for tests that look at them from outside."""
 
 from __future__ import annotations
 
@@ -14,6 +14,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 START = [sys.executable, "-c", "from galley.cli import main; main()"]
+
+
+def run_galley(*arguments: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """Run one `galley` command to its end."""
+    command = [*START, *map(str, arguments)]
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=240, check=False)
 
 
 @dataclass(frozen=True)

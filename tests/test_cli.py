@@ -10,14 +10,14 @@ from pathlib import Path
 import pytest
 
 import galley
+from tests.serving import run_galley
 
 ROOT = Path(__file__).parents[1]
 HEAVY = ("numpy", "numba", "onnxruntime", "torch", "sqlalchemy", "fastapi", "pydantic", "jinja2")
 
 
-def run(*arguments: str | Path, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-c", "from galley.cli import main; main()", *map(str, arguments)]
-    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=240, check=False)
+def run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    return run_galley(*arguments, cwd=ROOT)
 
 
 def one_line(text: str) -> bool:
@@ -57,7 +57,7 @@ def test_wrong_usage_exits_2(arguments: list[str]) -> None:
         (["check", "no-such-folder"], "no such folder"),
         (["check", "tests"], "galley init DIR"),
         (["serve", "no-such-folder"], "no such folder"),
-        (["serve", ".", "--database", "records.db"], "sqlite:///records.db"),
+        (["export", "demo", "--out", "x", "--database", "no-such.sqlite"], "no-such.sqlite"),
         (["export", "demo", "--out", "x", "--database", "oracle://x"], "oracle"),
         (["init", "tests"], "not an empty folder"),
         (["agents", "play", "nobody", "stay", "--layout", "cramped_room"], "nobody"),

@@ -44,6 +44,11 @@ class Workspace:
     def __repr__(self) -> str:
         return f"Workspace({str(self.path)!r})"
 
+    @property
+    def database(self) -> str:
+        """URL of the workspace's own records, for when no other database is named."""
+        return f"sqlite:///{self.path.resolve() / '.data' / 'galley.sqlite'}"
+
     def folder(self, kind: Kind) -> Path:
         """The folder in which things of this kind lie; it need not exist."""
         return self.path / _PLACES[kind][0]

@@ -22,7 +22,7 @@ class Cook:
             rows[y][x] = sign
         drawn = "\n".join("".join(row) for row in rows)
         self.layout = Layout.from_ascii("seen", drawn, cook_time_ticks=keyframe["cook_time"])
-        self.tick = -1
+        self.horizon: int = keyframe["horizon"]
         self._agent = agent
         self._things: dict[tuple[int, int], int] = {}
         self._pots: dict[tuple[int, int], PotView] = {}
@@ -31,7 +31,7 @@ class Cook:
 
     def see(self, frame: dict[str, Any]) -> None:
         """Take a keyframe or the changes of a tick in."""
-        self.tick = frame["tick"]
+        self.tick: int = frame["tick"]
         self._chefs: Sequence[list[int]] = frame["chefs"]
         self._things.update({(x, y): thing for x, y, thing in frame["things"]})
         for x, y, kind, count, ticks, ready in frame["pots"]:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from galley.commands.options import DatabaseOption, WorkspaceOption, database_url
+from galley.commands.options import DatabaseOption, WorkspaceOption
 
 
 def export(
@@ -19,10 +19,12 @@ def export(
     """Write participants, rounds, ticks, responses and events as CSV, with their data dictionary."""
     from galley.records.export import export_study
     from galley.records.store import Store
+    from galley.workspace import Workspace
 
-    store = Store.open(database_url(workspace, database))
+    store = Store.open(database or Workspace(workspace).database, must_exist=True)
     try:
-        export_study(store, study, out)
+        rows = export_study(store, study, out)
     finally:
         store.close()
-    typer.echo(f"Wrote {out}")
+    for file, count in rows.items():
+        typer.echo(f"{out / file}: {count} rows")

@@ -3,15 +3,50 @@
 from __future__ import annotations
 
 import importlib.util
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
 
 import typer
 
+from galley.commands.options import WorkspaceOption
 from galley.errors import GalleyError
 
 app = typer.Typer(help="Make agents (needs PyTorch: pip install 'galley[learn]').", no_args_is_help=True)
 
 
-def _need_torch() -> None:
-    for module in ("torch", "onnx"):
-        if importlib.util.find_spec(module) is None:
-            raise GalleyError(f"galley learn needs {module}; install it with: pip install 'galley[learn]'")
+class Split(StrEnum):
+    """Which of the published human games to learn from."""
+
+    train = "train"
+    test = "test"
+
+
+@app.callback()
+def _learn() -> None:
+    """Make agents (needs PyTorch: pip install 'galley[learn]')."""
+
+
+@app.command()
+def bc(
+    data: Annotated[
+        Path, typer.Option(metavar="PATH", help="Pickle of human games, or the folder that holds both.")
+    ],
+    split: Annotated[
+        Split, typer.Option(metavar="SPLIT", help="train makes human-bc, test makes human-proxy.")
+    ] = Split.train,
+    seed: Annotated[int, typer.Option(help="Seed of the training.")] = 0,
+    games: Annotated[int, typer.Option(min=1, help="Games that measure the result.")] = 100,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder for the bundle.", show_default="agents/ in the workspace"),
+    ] = None,
+    workspace: WorkspaceOption = Path(),
+) -> None:
+    """Clone human players on each layout and export the result as an agent."""
+    missing = [name for name in ("torch", "onnx", "tqdm") if importlib.util.find_spec(name) is None]
+    if missing:
+        raise GalleyError(f"galley learn needs {', '.join(missing)}; install: pip install 'galley[learn]'")
+    from galley.learning.bc import learn_bc
+
+    learn_bc(workspace, data=data, split=split.value, seed=seed, games=games, out=out, tell=typer.echo)

@@ -7,22 +7,26 @@ from typing import Annotated
 
 import typer
 
-from galley.commands.options import DatabaseOption, WorkspaceArgument, database_url
+from galley.commands.options import DatabaseOption, WorkspaceArgument
 
 
 def serve(
     workspace: WorkspaceArgument = Path(),
     study: Annotated[
         str | None,
-        typer.Option(
-            metavar="NAME", help="Serve this study alone.", show_default="every study of the workspace"
-        ),
+        typer.Option(metavar="NAME", help="Serve this study alone.", show_default="all of the workspace"),
     ] = None,
-    host: Annotated[str, typer.Option(metavar="ADDRESS", help="Address to listen on.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on.")] = 8000,
+    host: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Address to listen on.", show_default="127.0.0.1"),
+    ] = None,
+    port: Annotated[
+        int | None,
+        typer.Option(min=0, max=65535, help="Port to listen on; 0 takes a free one.", show_default="8000"),
+    ] = None,
     database: DatabaseOption = None,
 ) -> None:
     """Serve the studies of a workspace and print where they are to be found."""
     from galley.server.run import serve as run
 
-    run(workspace, study=study, host=host, port=port, database=database_url(workspace, database))
+    run(workspace, study=study, host=host, port=port, database=database)

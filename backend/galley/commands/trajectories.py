@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from galley.commands.options import DatabaseOption, JsonOption, WorkspaceOption, database_url
+from galley.commands.options import DatabaseOption, JsonOption, WorkspaceOption
 
 app = typer.Typer(help="Recorded games: import, verify, measure.", no_args_is_help=True)
 
@@ -43,8 +43,9 @@ def verify(
     """Replay every stored round of a study and compare it bit for bit with what was stored."""
     from galley.records.store import Store
     from galley.records.verify import verify_study
+    from galley.workspace import Workspace
 
-    store = Store.open(database_url(workspace, database))
+    store = Store.open(database or Workspace(workspace).database, must_exist=True)
     try:
         report = verify_study(store, study)
     finally:

@@ -47,8 +47,7 @@ def serve(
     place = Workspace(workspace)
     listening = listen(settings)
     try:
-        url = settings.database or f"sqlite:///{place.path.resolve() / '.data' / 'galley.sqlite'}"
-        with Store.open(url, serving=True) as store:
+        with Store.open(settings.database or place.database, serving=True) as store:
             app = create_app(place, store, settings)
             config = uvicorn.Config(
                 app,
