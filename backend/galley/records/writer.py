@@ -1,4 +1,4 @@
-"""The one thread that writes: jobs in order, each in its own transaction, and the journal once a second."""
+"""The one thread that writes: jobs in order, each in its own transaction, and the journal now and then."""
 
 from __future__ import annotations
 
@@ -22,8 +22,9 @@ from galley.records.tables import CLOCKS, KEYS, PAUSES, TICKS
 T = TypeVar("T")
 LOG = logging.getLogger(__name__)
 
-# Under the second that may be lost, so that the wait for the flush and the commit together stay within it.
-FLUSH_EVERY_S = 0.9
+# A killed process may lose a second at most, and a tick reaches the journal up to a tick after it was played:
+# this wait, a tick of 150 ms and the commit stay within the second.
+FLUSH_EVERY_S = 0.75
 CLOSE_TRIES = 5
 
 
