@@ -23,7 +23,7 @@ class Setting:
 SETTINGS: tuple[Setting, ...] = (
     Setting("host", "HOST", "Address to listen on; 0.0.0.0 lets other machines in."),
     Setting("port", "PORT", "Port to listen on; 0 takes any free one.", 0, 65535),
-    Setting("database", "DATABASE", "Database URL; empty means galley.db (SQLite) in the workspace."),
+    Setting("database", "DATABASE", "Database URL; empty means SQLite in the workspace."),
     Setting("study", "STUDY", "The one study to serve; empty serves all of the workspace."),
     Setting(
         "think_window_ms",
