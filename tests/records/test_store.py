@@ -7,6 +7,7 @@ import sqlite3
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -283,7 +284,8 @@ def test_a_database_that_cannot_be_used_is_refused_in_one_line(
     tmp_path: Path, database: str, words: str
 ) -> None:
     (tmp_path / "text").write_text("this is no database, but a text of some length\n" * 40)
-    sqlite3.connect(tmp_path / "foreign").execute("CREATE TABLE recipes (name TEXT)")
+    with closing(sqlite3.connect(tmp_path / "foreign")) as foreign:
+        foreign.execute("CREATE TABLE recipes (name TEXT)")
     names = {"dir": tmp_path, "text": tmp_path / "text", "foreign": tmp_path / "foreign"}
     with pytest.raises(GalleyError, match=words) as caught:
         Store.open(database.format(**names))
