@@ -2,7 +2,7 @@
 
 import { cellOf, seenAt } from "./board.js";
 import { drawEffect } from "./effects.js";
-import { WALL, isFloor, middle } from "./kitchen.js";
+import { isFloor, middle, wallOf } from "./kitchen.js";
 import { TOWARDS, breath, bump, calm, gait, pop, pulse } from "./motion.js";
 import { drawPot } from "./pots.js";
 import { CHEF_SIZE, THINGS } from "./sprites.js";
@@ -36,7 +36,7 @@ export function draw(context, board, sprites, kitchen, now) {
   const quiet = calm();
   context.setTransform(1, 0, 0, 1, 0, 0);
   context.drawImage(kitchen, 0, 0);
-  context.translate(0, WALL * s);
+  context.translate(0, wallOf(s));
   const seen = board.chefs.map((chef) => place(chef, now, board.tickMs, quiet));
   marker(context, board, seen[board.seat] ?? [0, 0], s, now, quiet);
   /** @type {Array<[number, () => void]>} */

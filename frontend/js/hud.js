@@ -8,6 +8,7 @@
  * @property {string} kind also the class of the card
  * @property {string} title
  * @property {string} [text]
+ * @property {number} [until] seconds that run down while the card lies there; `{s}` in the text stands for them
  * @property {string} [button] its label; without one there is nothing to press
  * @property {() => void} [press]
  * @property {number} [after] ms before the button may be pressed: keys still held must not press it
@@ -22,6 +23,7 @@ export class Hud {
     this.root = root;
     this.card = "";
     this.cardTimer = 0;
+    this.runDown = 0;
     this.used = new Set(recall());
     for (const hint of this.used) this.hideHint(hint);
   }
@@ -71,12 +73,12 @@ export class Hud {
   show(card) {
     const over = this.part("over");
     if (!over) return;
-    window.clearTimeout(this.cardTimer);
+    this.stopTimers();
     this.card = card.kind;
     over.className = `over over-${card.kind}`;
     over.hidden = false;
     this.write("card-title", card.title);
-    this.write("card-text", card.text ?? "");
+    this.tell(card.text ?? "", card.until);
     const details = this.part("card-details");
     if (details) details.hidden = card.kind !== "start";
     const button = this.part("card-button");
@@ -91,9 +93,20 @@ export class Hud {
     }, card.after ?? 0);
   }
 
+  /** @param {string} text @param {number | undefined} seconds */
+  tell(text, seconds) {
+    this.write("card-text", text.replace("{s}", String(seconds ?? "")));
+    if (seconds) this.runDown = window.setTimeout(() => this.tell(text, seconds - 1), 1000);
+  }
+
+  stopTimers() {
+    window.clearTimeout(this.cardTimer);
+    window.clearTimeout(this.runDown);
+  }
+
   hide() {
     const over = this.part("over");
-    window.clearTimeout(this.cardTimer);
+    this.stopTimers();
     this.card = "";
     if (over) over.hidden = true;
     const focused = document.activeElement;

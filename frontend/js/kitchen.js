@@ -7,6 +7,10 @@ import { STATIONS, newCanvas } from "./sprites.js";
 
 /** Height of the back wall above the first row, in tiles: room for steam. */
 export const WALL = 0.4;
+
+/** The same in whole device pixels, so that no tile lies between two. @param {number} tile */
+export const wallOf = (tile) => Math.round(WALL * tile);
+
 const CORNER = 0.17;
 
 /** @param {string[]} grid @param {number} x @param {number} y @returns {string} outside counts as a counter */
@@ -23,9 +27,9 @@ export const isFloor = (grid, x, y) => tileAt(grid, x, y) === " ";
 export function still(grid, sprites) {
   const s = sprites.tile;
   const width = grid[0]?.length ?? 0;
-  const { canvas, context } = newCanvas(width * s, (grid.length + WALL) * s);
-  for (let x = 0; x < width; x += 1) context.drawImage(sprites.get("wall"), x * s, 0, s + 1, WALL * s + 1);
-  context.translate(0, WALL * s);
+  const { canvas, context } = newCanvas(width * s, grid.length * s + wallOf(s));
+  for (let x = 0; x < width; x += 1) context.drawImage(sprites.get("wall"), x * s, 0, s + 1, wallOf(s) + 1);
+  context.translate(0, wallOf(s));
   for (const [x, y] of cells(grid)) context.drawImage(sprites.get((x + y) % 2 ? "floor-dark" : "floor"), x * s, y * s);
   for (const [x, y] of cells(grid)) if (isFloor(grid, x, y)) shade(context, grid, x, y, s);
   for (const [x, y, tile] of cells(grid)) if (tile !== " ") worktop(context, grid, x, y, sprites);

@@ -111,7 +111,7 @@ class Round {
     this.keys.enable(false);
     this.hud.show({
       kind: "paused", title: "Paused", button: "Go on", press: () => this.go(),
-      text: `The kitchen waits for you, at most ${secondsLeft} seconds more.`,
+      text: "The kitchen waits for you, {s} seconds more.", until: secondsLeft,
     });
   }
 

@@ -1,0 +1,57 @@
+"""The browser's copy of the protocol says what the server's table says."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from galley.server import wire
+from tests.frontend.pages import FRONTEND
+
+TEXT = (FRONTEND / "js/wire.js").read_text(encoding="utf-8")
+
+
+def _list(name: str) -> list[str]:
+    (row,) = re.findall(rf"export const {name} = .*?\(\[(.*?)\]\)", TEXT, re.S)
+    return re.findall(r'"(\w+)"', row)
+
+
+def _union(name: str) -> list[str]:
+    (row,) = re.findall(rf"@typedef \{{([^}}]*)\}} {name} ", TEXT)
+    return re.findall(r'"(\w+)"', row)
+
+
+def _shapes() -> dict[str, set[str]]:
+    """Fields of each message by its type, however its type is written down."""
+    shapes = {}
+    for row in re.findall(r'\{type: "[^{}]*\}', TEXT):
+        fields = re.findall(r"(\w+):", row)
+        shapes[re.findall(r'type: "(\w+)"', row)[0]] = set(fields) - {"type"}
+    for block in re.findall(r"/\*\*(.*?)\*/", TEXT, re.S):
+        if found := re.search(r'@property \{"(\w+)"\} type', block):
+            shapes[found[1]] = set(re.findall(r"@property \{.*\} (\w+)", block)) - {"type"}
+    return shapes
+
+
+def test_types_are_those_of_the_table() -> None:
+    assert _list("CLIENT_TYPES") == list(wire.CLIENT)
+    assert sorted(_list("SERVER_TYPES")) == sorted(wire.SERVER)
+
+
+def test_words_are_those_of_the_table() -> None:
+    assert _list("KEYS") == list(wire.KEYS)
+    assert _union("ReleaseReason") == list(wire.RELEASE_REASONS)
+    assert _union("Phase") == list(wire.PHASES)
+    assert f"PROTOCOL = {wire.PROTOCOL};" in TEXT
+
+
+def test_close_codes_are_those_of_the_server() -> None:
+    codes = dict(re.findall(r"(\w+): (4\d+)", TEXT))
+    wanted = {"elsewhere": wire.CLOSE_REPLACED, "over": wire.CLOSE_ENDED, "refused": wire.CLOSE_REFUSED}
+    assert {name: int(code) for name, code in codes.items()} == wanted
+
+
+@pytest.mark.parametrize("message", wire.MESSAGES, ids=lambda message: message.name)
+def test_fields_are_those_of_the_table(message: wire.Message) -> None:
+    assert _shapes()[message.name] == {field.name for field in message.fields}
