@@ -29,7 +29,12 @@ def test_numbers_are_even_and_unrelated_between_neighbours() -> None:
     drawn = uniform(5, 0, ticks)
     assert abs(drawn.mean() - 0.5) < 0.004
     assert abs(np.histogram(drawn, bins=10, range=(0, 1))[0] - 10_000).max() < 400
-    for other in (uniform(5, 1, ticks), uniform(6, 0, ticks), uniform(5, 0, ticks, 1), uniform(5, 0, ticks + 1)):
+    for other in (
+        uniform(5, 1, ticks),
+        uniform(6, 0, ticks),
+        uniform(5, 0, ticks, 1),
+        uniform(5, 0, ticks + 1),
+    ):
         assert abs(np.corrcoef(drawn, other)[0, 1]) < 0.012
 
 

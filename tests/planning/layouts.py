@@ -34,6 +34,7 @@ def layouts(draw: st.DrawFn, widest: int = 15, highest: int = 10) -> Layout:
         grid[y][x] = letter
     first, second = draw(st.lists(st.sampled_from(inside), min_size=2, max_size=2, unique=True))
     grid[first[1]][first[0]], grid[second[1]][second[0]] = "1", "2"
-    orders = draw(st.none() | st.lists(st.sampled_from(["onion", "tomato"]), min_size=1, max_size=4).map(tuple))
+    kinds = st.sampled_from(["onion", "tomato"])
+    orders = draw(st.none() | st.lists(kinds, min_size=1, max_size=4).map(tuple))
     text = tuple("".join(row) for row in grid)
     return Layout("drawn", text).with_rules(horizon_ticks=60, orders=orders)

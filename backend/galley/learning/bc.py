@@ -16,7 +16,7 @@ from galley.errors import GalleyError
 from galley.kitchen import Encoder, Layout
 from galley.kitchen.human_data import HumanGame, human_games
 from galley.kitchen.layout_file import find_layout
-from galley.learning.card import CardRow, card
+from galley.learning.card import SEED, CardRow, card
 from galley.learning.cloning import Clone, CloningSettings, train_clone
 from galley.learning.export import dense_onnx
 from galley.workspace import Workspace
@@ -55,7 +55,7 @@ def learn_bc(
     *,
     data: Path | None = None,
     split: Split,
-    seed: int = 0,
+    seed: int = SEED,
     games: int = 100,
     out: Path | None = None,
     tell: Callable[[str], None] = lambda line: None,

@@ -447,7 +447,7 @@ def decide(
 def remember(
     state: NDArray[int16], seat: int, memory: NDArray[int16], own_action: int, other_action: int, draw: float
 ) -> None:
-    """Nothing; notes in `memory` what both did in `state`; `draw` in [0, 1) settles how long one who is stuck wanders."""
+    """Nothing; notes in `memory` what both did in `state`; `draw` in [0, 1): how long the stuck wander."""
     if stuck(state, seat, memory):
         memory[WANDERS] = int(draw * MOST_WANDERS)
     elif memory[WANDERS] > 0:
