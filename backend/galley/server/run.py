@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import uvicorn
+from fastapi import FastAPI
 
 from galley.errors import GalleyError
 from galley.records import Store
@@ -49,31 +50,35 @@ def serve(
     try:
         with Store.open(settings.database or place.database, serving=True) as store:
             app = create_app(place, store, settings)
-            config = uvicorn.Config(
-                app,
-                loop="auto",
-                lifespan="on",
-                ws="websockets-sansio",
-                ws_max_size=MAX_FRAME_BYTES,
-                ws_per_message_deflate=False,
-                ws_ping_interval=PING_EVERY_S,
-                ws_ping_timeout=PING_WITHIN_S,
-                access_log=False,
-                log_level=settings.log_level,
-                server_header=False,
-                timeout_graceful_shutdown=SHUTDOWN_WITHIN_S,
-            )
             # A thread that wants the interpreter gets it sooner: a tick waits less for an agent that thinks
             # in Python.
             sys.setswitchinterval(SWITCH_INTERVAL_S)
             # After its own shutdown uvicorn raises the signal again; the records must be closed then too.
             signal.signal(signal.SIGTERM, signal.default_int_handler)
             try:
-                Announcing(config, settings, listening).run(sockets=[listening])
+                Announcing(server_config(app, settings), settings, listening).run(sockets=[listening])
             except KeyboardInterrupt:
                 return
     finally:
         listening.close()
+
+
+def server_config(app: FastAPI, settings: Settings) -> uvicorn.Config:
+    """How uvicorn runs the application: small uncompressed frames, dead connections found within seconds."""
+    return uvicorn.Config(
+        app,
+        loop="auto",
+        lifespan="on",
+        ws="websockets-sansio",
+        ws_max_size=MAX_FRAME_BYTES,
+        ws_per_message_deflate=False,
+        ws_ping_interval=PING_EVERY_S,
+        ws_ping_timeout=PING_WITHIN_S,
+        access_log=False,
+        log_level=settings.log_level,
+        server_header=False,
+        timeout_graceful_shutdown=SHUTDOWN_WITHIN_S,
+    )
 
 
 class Announcing(uvicorn.Server):

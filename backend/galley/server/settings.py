@@ -55,7 +55,7 @@ class Settings:
     study: str = ""
     think_window_ms: int = 1
     max_form_kib: int = 256
-    messages_per_s: int = 60
+    messages_per_s: int = 200
     log_level: str = "warning"
 
 
