@@ -59,8 +59,10 @@ _PLACES = {
 """Where a chef is at each stand."""
 
 
-def brain(layout: Layout, seat: int) -> Brain:
+def brain(layout: Layout, seat: int, team: bool = False) -> Brain:
     """All that a robot on `seat` needs to know of a layout; its joint motion tables are still empty.
+
+    In a `team` the other chef is not a human who draws its subtasks but plans along.
 
     Raises:
         GalleyError: the layout cannot be served, is too large, or value iteration reached its limit.
@@ -79,7 +81,7 @@ def brain(layout: Layout, seat: int) -> Brain:
     human_next = np.zeros((TASKS, LEFTS, STANDS, WORLDS), dtype=np.float32)
     pots = int((known.reachable.any(axis=0) & (layout.tiles.ravel() == POT)).sum())
     if not passes:
-        sweeps = iterate(robot_takes, human_takes, pots, unit, robot_next, human_next)
+        sweeps = iterate(robot_takes, human_takes, pots, unit, robot_next, human_next, team)
         if sweeps >= MOST_SWEEPS:
             raise GalleyError(
                 f"layout {layout.name!r}: the robot's values did not settle in {MOST_SWEEPS} sweeps; "

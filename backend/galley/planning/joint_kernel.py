@@ -35,30 +35,12 @@ class JointTables(NamedTuple):
     floor_of: NDArray[int16]  # [C], -1 where there is no floor
     cell_of: NDArray[int16]  # [F]
     ahead: NDArray[int16]  # [F, 4], floor number or -1
-    faced: NDArray[int16]  # [F, 4], cell
+    ends: NDArray[int16]  # [G, 4], the poses (4 * floor + facing) that end a goal, then -1
     slot: NDArray[int32]  # [G, G], -1 when not filled
     pair: NDArray[int32]  # [K, 2], the goals of a slot
     used: NDArray[int32]  # [1], tables filled so far
     tables: NDArray[int16]
     queue: NDArray[int32]  # [(F + 4)^2], space to work in
-
-
-@njit(cache=True)
-def poses_of(joint: JointTables, goal: int, poses: NDArray[int16]) -> int:
-    """How many poses (4 * floor + facing) end a goal; they are written to `poses` int16[4]."""
-    cells = joint.floor_of.size
-    count = 0
-    if goal == FREE:
-        return 0
-    if goal > cells:
-        poses[0] = goal - 1 - cells
-        return 1
-    for floor in range(joint.cell_of.size):
-        for facing in range(STAY):
-            if joint.faced[floor, facing] == goal - 1 and count < MOST_POSES:
-                poses[count] = 4 * floor + facing
-                count += 1
-    return count
 
 
 @njit(cache=True)
@@ -109,10 +91,10 @@ def _fill(joint: JointTables, goal0: int, goal1: int, table: NDArray[int16]) -> 
     """Nothing; `table` int16[F + 4, F + 4] becomes the fewest ticks until both goals hold at once."""
     floors = joint.cell_of.size
     size = floors + MOST_POSES
-    poses0 = np.zeros(MOST_POSES, dtype=np.int16)
-    poses1 = np.zeros(MOST_POSES, dtype=np.int16)
-    count0 = poses_of(joint, goal0, poses0)
-    count1 = poses_of(joint, goal1, poses1)
+    poses0 = joint.ends[goal0]
+    poses1 = joint.ends[goal1]
+    count0 = int((poses0 >= 0).sum())
+    count1 = int((poses1 >= 0).sum())
     bumps = _faces_floor(joint, poses0, count0) or _faces_floor(joint, poses1, count1)
     cell0 = np.arange(size).astype(np.int16)
     cell1 = cell0.copy()
@@ -196,20 +178,30 @@ def table_of(joint: JointTables, goal0: int, goal1: int) -> int:
 
 @njit(cache=True)
 def _settled(joint: JointTables, goal: int, pose: int) -> int:
-    """The state of a chef that has settled at `pose`, or -1 if that pose does not end its goal."""
-    cells = joint.floor_of.size
-    if goal == FREE:
-        return NONE
-    if goal > cells:
-        return joint.cell_of.size if pose == goal - 1 - cells else NONE
-    if joint.faced[pose // 4, pose % 4] != goal - 1:
-        return NONE
-    poses = np.zeros(MOST_POSES, dtype=np.int16)
-    count = poses_of(joint, goal, poses)
-    for index in range(count):
-        if poses[index] == pose:
-            return int(joint.cell_of.size + index)
-    return NONE
+    """The state of a chef that has settled at `pose`, or that of its cell if that pose does not end its goal."""
+    for index in range(MOST_POSES):
+        if joint.ends[goal, index] == pose:
+            return joint.cell_of.size + index
+    return pose // 4
+
+
+@njit(cache=True)
+def _cost(joint: JointTables, slot: int, goal0: int, goal1: int, pose0: int, pose1: int) -> int:
+    """`joint_cost` from the table in a slot."""
+    table = joint.tables[slot]
+    s0 = _settled(joint, goal0, pose0)
+    s1 = _settled(joint, goal1, pose1)
+    floor0 = pose0 // 4
+    floor1 = pose1 // 4
+    # Whoever is where it should be may settle there or, to make way, move on.
+    best = table[s0, s1]
+    if s0 != floor0:
+        best = min(best, table[floor0, s1])
+        if s1 != floor1:
+            best = min(best, table[floor0, floor1])
+    if s1 != floor1:
+        best = min(best, table[s0, floor1])
+    return int(best)
 
 
 @njit(cache=True)
@@ -217,17 +209,7 @@ def joint_cost(joint: JointTables, goal0: int, goal1: int, pose0: int, pose1: in
     """The fewest ticks from poses (4 * floor + facing) until both goals hold at once; FAR if never."""
     if goal0 == FREE and goal1 == FREE:
         return 0
-    table = joint.tables[table_of(joint, goal0, goal1)]
-    s0 = _settled(joint, goal0, pose0)
-    s1 = _settled(joint, goal1, pose1)
-    best = table[pose0 // 4, pose1 // 4]
-    if s0 >= 0:
-        best = min(best, table[s0, pose1 // 4])
-    if s1 >= 0:
-        best = min(best, table[pose0 // 4, s1])
-        if s0 >= 0:
-            best = min(best, table[s0, s1])
-    return int(best)
+    return _cost(joint, table_of(joint, goal0, goal1), goal0, goal1, pose0, pose1)
 
 
 @njit(cache=True)
@@ -267,22 +249,53 @@ def joint_step(
     Among plans of fewest ticks: the chef of seat `first` as near its goal as can be, then the other,
     then the fewest moves, then the first in the order of action codes. `costs` are those of `distances`.
     """
-    cost = joint_cost(joint, goal0, goal1, pose0, pose1)
     best = STAY * 8 + STAY
+    if goal0 == FREE and goal1 == FREE:
+        return best
+    slot = table_of(joint, goal0, goal1)
+    cost = _cost(joint, slot, goal0, goal1, pose0, pose1)
     if cost == 0 or cost >= FAR:
         return best
     score = np.int64(1) << 60
     for act0 in range(STAY + 1):
         for act1 in range(STAY + 1):
             new0, new1 = moved(joint, pose0, pose1, act0, act1)
-            left = joint_cost(joint, goal0, goal1, new0, new1)
-            if left != cost - 1:
+            if _cost(joint, slot, goal0, goal1, new0, new1) != cost - 1:
                 continue
             near0 = np.int64(_alone(joint, costs, goal0, new0))
             near1 = np.int64(_alone(joint, costs, goal1, new1))
             mine, others = (near0, near1) if first == 0 else (near1, near0)
-            moves = (act0 < STAY) + (act1 < STAY)
-            this = (mine * 65536 + others) * 4 + moves
+            this = (mine * 65536 + others) * 4 + (act0 < STAY) + (act1 < STAY)
+            if this < score:
+                score = this
+                best = 8 * act0 + act1
+    return best
+
+
+@njit(cache=True)
+def step_with_way(
+    joint: JointTables, costs: NDArray[int16], goal0: int, goal1: int, first: int, pose0: int, pose1: int
+) -> int:
+    """As `joint_step`, but the chef of seat `first` gets to its goal soonest; of equals the best for both goals."""
+    best = STAY * 8 + STAY
+    one, other = (goal0, FREE) if first == 0 else (FREE, goal1)
+    slot = table_of(joint, one, other)
+    both = table_of(joint, goal0, goal1)
+    if joint.slot[one, other] != slot:  # the second table took the place of the first
+        return best
+    cost = _cost(joint, slot, one, other, pose0, pose1)
+    if cost >= FAR:
+        return best
+    score = np.int64(1) << 60
+    for act0 in range(STAY + 1):
+        for act1 in range(STAY + 1):
+            new0, new1 = moved(joint, pose0, pose1, act0, act1)
+            left = _cost(joint, slot, one, other, new0, new1)
+            if left > max(cost - 1, 0):
+                continue
+            together = np.int64(_cost(joint, both, goal0, goal1, new0, new1))
+            near = _alone(joint, costs, goal0, new0) + _alone(joint, costs, goal1, new1)
+            this = ((left * 65536 + together) * 65536 + near) * 4 + (act0 < STAY) + (act1 < STAY)
             if this < score:
                 score = this
                 best = 8 * act0 + act1

@@ -142,10 +142,20 @@ def joint_tables(layout: Layout) -> JointTables:
         floor_of=floor_of,
         cell_of=cell_of,
         ahead=floor_of[faced],
-        faced=faced,
+        ends=_ends(faced, tiles.size),
         slot=np.full((goals, goals), NONE, dtype=np.int32),
         pair=np.zeros((slots, 2), dtype=np.int32),
         used=np.zeros(1, dtype=np.int32),
         tables=np.empty((slots, size, size), dtype=np.int16),
         queue=np.empty(size * size, dtype=np.int32),
     )
+
+
+def _ends(faced: NDArray[np.int16], cells: int) -> NDArray[np.int16]:
+    """int16[G, 4]: the poses that end each goal; `faced` int16[F, 4] is the cell that each pose faces."""
+    ends: NDArray[np.int16] = np.full((1 + cells + faced.size, MOST_POSES), NONE, dtype=np.int16)
+    for pose, cell in enumerate(faced.ravel().tolist()):
+        row = ends[1 + cell]
+        row[np.argmin(row >= 0)] = pose
+        ends[1 + cells + pose, 0] = pose
+    return ends

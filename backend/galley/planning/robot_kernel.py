@@ -205,7 +205,7 @@ def _cost_to_go(
     if cell < 0:
         stand = _stand_of(state[CHEF * seat + HELD])
         return robot_waits(
-            stand, human_task, human_left, at, pots, unit, brain.human_takes, brain.robot_next
+            stand, human_task, human_left, at, pots, unit, brain.human_takes, brain.robot_next, False
         )
     left = float(max(own, _cooks_for(brain, state, cell)) + 1 + delay)
     return both_busy(

@@ -91,8 +91,8 @@ def done(task: int, at: int, pots: int) -> tuple[int, int]:
 
 
 @njit(cache=True)
-def sensible(stand: int, task: int, at: int, pots: int, other: int) -> bool:
-    """Whether a subtask makes sense at a stand while the other chef is at `other`."""
+def sensible(stand: int, task: int, at: int, pots: int, other: int, team: bool) -> bool:
+    """Whether a subtask makes sense at a stand while the other chef is at `other`; a team fetches dishes ahead."""
     full = at // MOST_ORDERS % (MOST_FULL + 1)
     count = at // MOST_ORDERS // (MOST_FULL + 1)
     if stand == WITH_SOUP:
@@ -100,10 +100,10 @@ def sensible(stand: int, task: int, at: int, pots: int, other: int) -> bool:
     if stand == WITH_INGREDIENT:
         return task == (FILL_POT if count > 0 or full < pots else PUT_DOWN)
     if stand == WITH_DISH:
-        return task == (FETCH_SOUP if full > 0 else PUT_DOWN)
+        return task == FETCH_SOUP if full > 0 else task == PUT_DOWN or (team and task == FETCH_SOUP)
     if task == TAKE_INGREDIENT:
         return count > 0 or full < pots
-    return task == TAKE_A_DISH and full > (other == FETCH_SOUP)
+    return task == TAKE_A_DISH and full + (team and count > 0) > (other == FETCH_SOUP)
 
 
 @njit(cache=True)
@@ -131,7 +131,7 @@ def both_busy(
 @njit(cache=True)
 def robot_waits(
     stand: int, human: int, human_left: float, at: int, pots: int, unit: float,
-    durations: NDArray[float64], robot_next: NDArray[float32],
+    durations: NDArray[float64], robot_next: NDArray[float32], team: bool,
 ) -> float:  # fmt: skip
     """The cost to go of a robot that waits until the human has done its subtask and begun another."""
     ticks = max(human_left, 1.0)
@@ -139,26 +139,29 @@ def robot_waits(
     if then < 0:
         return ticks
     total = 0.0
+    least = np.inf
     ways = 0
     for task in range(1, TASKS):
-        if sensible(human_stand, task, then, pots, IDLE) and durations[human_stand, task] < UNABLE:
-            total += robot_next[stand, task, _step(durations[human_stand, task], unit), then]
+        if sensible(human_stand, task, then, pots, IDLE, team) and durations[human_stand, task] < UNABLE:
+            cost = robot_next[stand, task, _step(durations[human_stand, task], unit), then]
+            total += cost
+            least = min(least, cost)
             ways += 1
     if ways == 0:
         return ticks + robot_next[stand, IDLE, _step(IDLE_TICKS, unit), then]
-    return ticks + total / ways
+    return ticks + (least if team else total / ways)
 
 
 @njit(cache=True)
 def iterate(
     robot_takes: NDArray[float64], human_takes: NDArray[float64], pots: int, unit: float,
-    robot_next: NDArray[float32], human_next: NDArray[float32],
+    robot_next: NDArray[float32], human_next: NDArray[float32], team: bool,
 ) -> int:  # fmt: skip
     """How many sweeps it took (MOST_SWEEPS: the limit was reached); fills both tables of costs to go in ticks.
 
     `robot_takes`, `human_takes` float64[STANDS, TASKS]: durations. `robot_next` float32[STANDS, TASKS, LEFTS,
     WORLDS]: the robot chooses while the human is at a task. `human_next` float32[TASKS, LEFTS, STANDS, WORLDS]:
-    the human draws while the robot is at a task.
+    the human draws while the robot is at a task; in a `team` it chooses the best as well.
     """
     robot_next[:] = 0
     human_next[:] = 0
@@ -173,31 +176,37 @@ def iterate(
                         ticks = left * unit
                         for stand in range(STANDS):
                             best = robot_waits(
-                                stand, busy, ticks, at, pots, unit, human_takes, robot_next
+                                stand, busy, ticks, at, pots, unit, human_takes, robot_next, team
                             )
                             total = 0.0
+                            least = np.inf
                             ways = 0
                             for task in range(1, TASKS):
-                                if robot_takes[stand, task] < UNABLE and sensible(stand, task, at, pots, busy):
+                                if not sensible(stand, task, at, pots, busy, team):
+                                    continue
+                                if robot_takes[stand, task] < UNABLE:
                                     cost = both_busy(
                                         task, robot_takes[stand, task], busy, ticks, at, pots, unit,
                                         robot_next, human_next,
                                     )  # fmt: skip
                                     best = min(best, cost)
-                                if human_takes[stand, task] < UNABLE and sensible(stand, task, at, pots, busy):
-                                    total += both_busy(
+                                if human_takes[stand, task] < UNABLE:
+                                    cost = both_busy(
                                         busy, ticks, task, human_takes[stand, task], at, pots, unit,
                                         robot_next, human_next,
                                     )  # fmt: skip
+                                    total += cost
+                                    least = min(least, cost)
                                     ways += 1
                             if ways == 0:
                                 total = both_busy(
                                     busy, ticks, IDLE, IDLE_TICKS, at, pots, unit, robot_next, human_next
                                 )
+                                least = total
                                 ways = 1
                             change = max(change, abs(best - robot_next[stand, busy, left, at]))
                             robot_next[stand, busy, left, at] = best
-                            mean = total / ways
+                            mean = least if team else total / ways
                             change = max(change, abs(mean - human_next[busy, left, stand, at]))
                             human_next[busy, left, stand, at] = mean
             sweeps = max(sweeps, sweep + 1)

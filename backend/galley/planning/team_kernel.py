@@ -1,0 +1,479 @@
+"""The search for a plan that both chefs follow, compiled: A* over pairs of subtasks within a beam.
+
+Source: Fontaine et al. 2021 (RSS), Sec. IV "Centralized Planning", after Carroll et al. 2019. Ours: costs to go by
+value iteration as the heuristic, a beam per tick, plans in which one chef has the right of way.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy import float32, int16, int32, int64, uint8, uint64
+from numpy.typing import NDArray
+
+from galley.kitchen.codes import (
+    BIT_BLOCKED,
+    CELL,
+    CELLS,
+    CHEF,
+    COUNTER,
+    DELIVERIES,
+    DISH,
+    FACING,
+    HELD,
+    INGREDIENTS_PER_SOUP,
+    INTERACT,
+    NOTHING,
+    ONION,
+    OUT_EVENTS,
+    POT,
+    POT_COUNT,
+    SERVING,
+    SOUP_OF_KIND,
+    SPEC_ORDERS,
+    SPEC_TILES,
+    STAY,
+    TICK,
+    TOMATO,
+)
+from galley.kitchen.rules import finished, step
+from galley.planning.joint_kernel import FAR, FREE, joint_cost, joint_step, step_with_way
+from galley.planning.myopic_kernel import _open_order, _room, _wanted
+from galley.planning.robot_kernel import Brain, _alone, _cooks_for, _pose, _task_of, world_of
+from galley.planning.subtask_kernel import (
+    DELIVER,
+    DROP,
+    FETCH,
+    FILL,
+    KINDS,
+    TAKE_DISH,
+    TAKE_ONION,
+    TAKE_SOUP,
+    TAKE_TOMATO,
+    WAIT,
+    _add,
+    _sources,
+)
+from galley.planning.value_kernel import IDLE, MOST_ORDERS, both_busy, world
+
+LEG_TICKS = 96
+"""The most ticks from one decision to the next interaction."""
+STAGE_TICKS = 3.5
+"""What a step on a thing's way from dispenser to pot is taken to cost where things pass over counters."""
+
+
+class Search(NamedTuple):
+    """Space for a search of T ticks with a beam of W nodes a tick; a node's number is tick * W + place."""
+
+    states: NDArray[int16]  # [T * W, S]
+    parents: NDArray[int32]  # [T * W]
+    legs: NDArray[uint8]  # [T * W, LEG_TICKS, 2], the actions from the parent
+    lengths: NDArray[int16]  # [T * W]
+    totals: NDArray[float32]  # [T * W], cost so far + cost to go
+    counts: NDArray[int32]  # [T], nodes in each tick
+    keys: NDArray[uint64]  # [K], states met
+    times: NDArray[int16]  # [K], when first
+
+
+@njit(cache=True)
+def _pass_counters(
+    brain: Brain, state: NDArray[int16], seat: int, out: NDArray[int16], summed: NDArray[int16]
+) -> None:
+    """Nothing; adds the empty counters that both reach with the least way for both together."""
+    chef = CHEF * seat
+    other = CHEF * (1 - seat)
+    own = brain.costs[4 * state[chef + CELL] + state[chef + FACING]]
+    theirs = brain.costs[4 * state[other + CELL] + state[other + FACING]]
+    for cell in range(own.size):
+        summed[cell] = -1
+        if own[cell] >= 0 and theirs[cell] >= 0:
+            summed[cell] = own[cell] + theirs[cell]
+            if brain.spec[SPEC_TILES + cell] == COUNTER and state[CELLS + cell] == NOTHING:
+                _add(out, DROP, cell, summed)
+
+
+@njit(cache=True)
+def team_options(
+    brain: Brain, state: NDArray[int16], seat: int, orders: int, out: NDArray[int16], summed: NDArray[int16]
+) -> None:
+    """Nothing; fills `out` int16[KINDS, 4] as `subtasks` does, with all that can serve a plan for `orders` more soups."""
+    out[:] = 0
+    spec, reach = brain.spec, brain.reach
+    chef = CHEF * seat
+    costs = brain.costs[4 * state[chef + CELL] + state[chef + FACING]]
+    held = state[chef + HELD]
+    others = state[CHEF * (1 - seat) + HELD]
+    wanted = _wanted(spec, state, reach)
+    any_order = spec[SPEC_ORDERS] == 0
+    soups = 0  # made or being made
+    begun = 0
+    dishes = int(others == DISH)
+    if others > SOUP_OF_KIND:
+        soups += 1
+    room = np.zeros(3, dtype=np.int64)
+    for cell in range(costs.size):
+        tile = spec[SPEC_TILES + cell]
+        packed = state[CELLS + cell]
+        if tile == POT:
+            count = packed // POT_COUNT % POT_COUNT
+            soups += count == INGREDIENTS_PER_SOUP
+            begun += count > 0
+            for kind in (ONION, TOMATO):
+                room[kind] += _room(packed, wanted, kind, any_order)
+        elif tile == COUNTER and packed > SOUP_OF_KIND:
+            soups += 1
+    if held == NOTHING:
+        for kind in (ONION, TOMATO):
+            if any_order or _open_order(spec, state, 0) == kind:
+                _sources(spec, state, reach, costs, seat, kind + SOUP_OF_KIND, False, TAKE_SOUP, out)
+        if begun > dishes:
+            _sources(spec, state, reach, costs, seat, DISH, False, TAKE_DISH, out)
+        for kind in (ONION, TOMATO):
+            if room[kind] > (others == kind) and soups < orders:
+                _sources(
+                    spec, state, reach, costs, seat, kind, False,
+                    TAKE_ONION if kind == ONION else TAKE_TOMATO, out,
+                )  # fmt: skip
+        return
+    for cell in range(costs.size):
+        tile = spec[SPEC_TILES + cell]
+        packed = state[CELLS + cell]
+        if held == DISH:
+            if tile == POT and packed // POT_COUNT % POT_COUNT == INGREDIENTS_PER_SOUP:
+                _add(out, FETCH, cell, costs)
+        elif held > DISH:
+            if tile == SERVING and (any_order or _open_order(spec, state, 0) == held - SOUP_OF_KIND):
+                _add(out, DELIVER, cell, costs)
+        elif tile == POT and _room(packed, wanted, held, any_order) > 0:
+            _add(out, FILL, cell, costs)
+    _pass_counters(brain, state, seat, out, summed)
+    if out[DROP, 0] == 0:
+        for cell in range(costs.size):
+            if spec[SPEC_TILES + cell] == COUNTER and state[CELLS + cell] == NOTHING:
+                _add(out, DROP, cell, costs)
+
+
+@njit(cache=True)
+def _left(brain: Brain, state: NDArray[int16], seat: int, cell: int) -> float:
+    """The ticks that a chef alone needs to interact with the tile at `cell`."""
+    return float(max(_alone(brain, state, seat, cell), _cooks_for(brain, state, cell)) + 1)
+
+
+@njit(cache=True)
+def _stages(brain: Brain, state: NDArray[int16], orders: int) -> float:
+    """A cost to go where things pass over counters: the steps that are left on the way of each thing needed."""
+    spec = brain.spec
+    ingredients = 0
+    stages = 0.0
+    shared_ingredients = 0
+    shared_dishes = 0
+    soups = 0  # out of the pot
+    in_pots = 0
+    cooking = 0
+    inside = 0
+    for cell in range(brain.reach.shape[1]):
+        tile = spec[SPEC_TILES + cell]
+        packed = state[CELLS + cell]
+        if tile == POT:
+            count = packed // POT_COUNT % POT_COUNT
+            if count == INGREDIENTS_PER_SOUP:
+                in_pots += 1
+                cooking = max(cooking, _cooks_for(brain, state, cell))
+            else:
+                inside += count
+        elif tile == COUNTER and packed != NOTHING:
+            shared = brain.reach[0, cell] and brain.reach[1, cell]
+            if packed > SOUP_OF_KIND:
+                soups += 1
+                stages += 2
+            elif shared and packed == DISH:
+                shared_dishes += 1
+            elif shared:
+                shared_ingredients += 1
+    near = 0.0
+    hands_ingredients = 0.0
+    hands_dishes = 0.0
+    for seat in range(2):
+        held = state[CHEF * seat + HELD]
+        station = -1
+        if held > SOUP_OF_KIND:
+            soups += 1
+            stages += 1
+            station = SERVING
+        elif held != NOTHING:
+            station = POT
+        best = FAR
+        for cell in range(brain.reach.shape[1]):
+            if spec[SPEC_TILES + cell] == station:
+                cost = _alone(brain, state, seat, cell)
+                if cost >= 0:
+                    best = min(best, cost)
+        reaches = best < FAR
+        if held == DISH:
+            hands_dishes += 1 if reaches else 0.34
+        elif held == ONION or held == TOMATO:
+            hands_ingredients += 1 if reaches else 0.34
+        if reaches:
+            near += 0.05 * best
+    made = soups + in_pots
+    ingredients = max(0, orders - made) * INGREDIENTS_PER_SOUP - inside
+    plates = max(0, orders - soups)
+    stages += 4 * ingredients - 2 * min(ingredients, shared_ingredients) - 3 * hands_ingredients
+    stages += 4 * plates - 2 * min(plates, shared_dishes) - 3 * hands_dishes
+    stages += plates  # to deliver what is then fetched
+    last = float(cooking)
+    if ingredients > 0:
+        last = float(spec[2]) + 2 * STAGE_TICKS
+    return max(stages * STAGE_TICKS / 2 + near, last)
+
+
+@njit(cache=True)
+def to_go(
+    brain: Brain, state: NDArray[int16], orders: int, options: NDArray[int16], summed: NDArray[int16]
+) -> float:
+    """The estimated ticks until `orders` more soups are served; `options` int16[2, KINDS, 4] is filled."""
+    team_options(brain, state, 0, orders, options[0], summed)
+    team_options(brain, state, 1, orders, options[1], summed)
+    if brain.pots[1]:
+        return _stages(brain, state, orders)
+    best = np.inf
+    for kind0 in range(KINDS):
+        if kind0 != WAIT and options[0, kind0, 0] == 0:
+            continue
+        for kind1 in range(KINDS):
+            if (kind1 != WAIT and options[1, kind1, 0] == 0) or (kind0 == WAIT and kind1 == WAIT):
+                continue
+            cost = pair_to_go(
+                brain, state, orders, kind0, options[0, kind0, 1], kind1, options[1, kind1, 1], 0
+            )
+            best = min(best, cost)
+    return best if best < np.inf else 500.0
+
+
+@njit(cache=True)
+def pair_to_go(
+    brain: Brain, state: NDArray[int16], orders: int, kind0: int, cell0: int, kind1: int, cell1: int, delay: int
+) -> float:
+    """The estimated ticks until `orders` more soups are served if the chefs now take up these subtasks."""
+    at = world_of(brain.spec, state, kind0 == TAKE_SOUP or kind1 == TAKE_SOUP)
+    ahead = min(MOST_ORDERS, max(1, orders))
+    at = at // MOST_ORDERS * MOST_ORDERS + ahead - 1
+    left0 = 0.0 if kind0 == WAIT else _left(brain, state, 0, cell0)
+    left1 = 0.0 if kind1 == WAIT else _left(brain, state, 1, cell1)
+    if kind0 == WAIT:
+        left0 = left1 + 1
+    if kind1 == WAIT:
+        left1 = left0 + 1
+    return both_busy(
+        _task_of(kind0), left0 + delay, _task_of(kind1), left1 + delay, at, int(brain.pots[0]), brain.unit[0],
+        brain.robot_next, brain.human_next,
+    )  # fmt: skip
+
+
+@njit(cache=True)
+def walk(
+    brain: Brain, state: NDArray[int16], cell0: int, cell1: int, wait0: bool, wait1: bool, first: int,
+    leg: NDArray[uint8], out: NDArray[int32],
+) -> int:  # fmt: skip
+    """How many ticks until a chef has interacted at its tile, 0 if none does; `state` and `leg` are filled.
+
+    `first` 2: both tiles are reached soonest; 0 or 1: that chef's is, the other comes as near as it can.
+    """
+    goal0 = FREE if wait0 else 1 + cell0
+    goal1 = FREE if wait1 else 1 + cell1
+    useful = ~(1 << BIT_BLOCKED)
+    for tick in range(LEG_TICKS):
+        at0 = not wait0 and _alone(brain, state, 0, cell0) == 0
+        at1 = not wait1 and _alone(brain, state, 1, cell1) == 0
+        does0 = at0 and _cooks_for(brain, state, cell0) == 0
+        does1 = at1 and _cooks_for(brain, state, cell1) == 0
+        pose0, pose1 = _pose(brain, state, 0), _pose(brain, state, 1)
+        way = first
+        blocked = joint_cost(brain.joint, goal0, goal1, pose0, pose1) >= FAR
+        if (way == 0 and (wait0 or at0)) or (way == 1 and (wait1 or at1)):
+            way = 2
+        if way == 2 and blocked:
+            way = 0 if at0 or not at1 else 1
+        if way == 2:
+            code = joint_step(brain.joint, brain.costs, goal0, goal1, pose0, pose1, 0)
+        else:
+            code = step_with_way(brain.joint, brain.costs, goal0, goal1, way, pose0, pose1)
+        act0, act1 = code // 8, code % 8
+        if does0:
+            act0 = INTERACT
+        elif at0 and blocked:
+            act0 = STAY
+        if does1:
+            act1 = INTERACT
+        elif at1 and blocked:
+            act1 = STAY
+        if act0 == STAY and act1 == STAY and not (at0 or at1):
+            return 0
+        leg[tick, 0] = act0
+        leg[tick, 1] = act1
+        step(brain.spec, state, act0, act1, out)
+        if (out[OUT_EVENTS] | out[OUT_EVENTS + 1]) & useful:
+            return tick + 1
+        if does0 or does1:
+            return 0
+    return 0
+
+
+@njit(cache=True)
+def _key(state: NDArray[int16]) -> uint64:
+    """A hash of everything in a state but the tick."""
+    word = uint64(1469598103934665603)
+    for index in range(state.size):
+        if index != TICK:
+            word = (word ^ uint64(state[index] + 7)) * uint64(1099511628211)
+            word ^= word >> uint64(29)
+    return word | uint64(1)
+
+
+@njit(cache=True)
+def _met_before(search: Search, key: uint64, tick: int) -> bool:
+    """Whether a state was met no later than at `tick`; notes it otherwise."""
+    size = search.keys.size
+    at = np.int64(key % uint64(size))
+    for _ in range(size):
+        if search.keys[at] == key:
+            if search.times[at] <= tick:
+                return True
+            search.times[at] = tick
+            return False
+        if search.keys[at] == 0:
+            search.keys[at] = key
+            search.times[at] = tick
+            return False
+        at = (at + 1) % size
+    return False
+
+
+@njit(cache=True)
+def _place(search: Search, tick: int, total: float) -> int:
+    """The number of the node that a new one of this estimate takes at a tick, -1 if none is worse."""
+    width = search.parents.size // search.counts.size
+    if search.counts[tick] < width:
+        search.counts[tick] += 1
+        return int(tick * width + search.counts[tick] - 1)
+    worst = tick * width
+    for node in range(tick * width + 1, (tick + 1) * width):
+        if search.totals[node] > search.totals[worst]:
+            worst = node
+    return -1 if search.totals[worst] <= total else int(worst)
+
+
+@njit(cache=True)
+def search_plan(
+    brain: Brain, search: Search, start: NDArray[int16], orders: int, pairs: int
+) -> tuple[int, bool]:
+    """(node, whether it is the end): the last node of the best plan for `orders` more soups from `start`.
+
+    Of each node the `pairs` most promising pairs of subtasks are tried, in three ways each. When the beam
+    runs out of ticks the node of the best estimate is given, and False.
+    """
+    ticks = search.counts.size
+    width = search.parents.size // ticks
+    search.counts[:] = 0
+    search.keys[:] = 0
+    state = start.copy()
+    leg = np.zeros((LEG_TICKS, 2), dtype=np.uint8)
+    out = np.zeros(4, dtype=np.int32)
+    options = np.zeros((2, KINDS, 4), dtype=np.int16)
+    ahead = np.zeros((2, KINDS, 4), dtype=np.int16)
+    summed = np.zeros(brain.reach.shape[1], dtype=np.int16)
+    most = (KINDS * 3 + 1) ** 2
+    rated = np.empty(most, dtype=np.float64)
+    which = np.empty((most, 4), dtype=np.int64)
+    served = start[DELIVERIES]
+    search.counts[0] = 1
+    search.states[0] = start
+    search.parents[0] = -1
+    search.lengths[0] = 0
+    search.totals[0] = 0
+    best_end = -1
+    best_node = 0
+    best_left = np.inf
+    for tick in range(ticks):
+        if best_end >= 0:
+            break
+        for place in range(search.counts[tick]):
+            node = tick * width + place
+            now = search.states[node]
+            left = orders - (now[DELIVERIES] - served)
+            if left <= 0 or finished(brain.spec, now):
+                if best_end < 0:
+                    best_end = node
+                continue
+            if tick > 0 and search.totals[node] - tick < best_left:
+                best_left = search.totals[node] - tick
+                best_node = node
+            to_go(brain, now, left, options, summed)
+            found = _rate_pairs(brain, now, left, options, rated, which, summed, ahead)
+            order = np.argsort(rated[:found])
+            for index in range(min(pairs, found)):
+                pick = which[order[index]]
+                for first in range(3):
+                    if first < 2 and (pick[0] == WAIT or pick[2] == WAIT):
+                        continue
+                    state[:] = now
+                    length = walk(
+                        brain, state, pick[1], pick[3], pick[0] == WAIT, pick[2] == WAIT, 2 - first, leg, out
+                    )
+                    then = tick + length
+                    if length == 0 or then >= ticks:
+                        continue
+                    if _met_before(search, _key(state), then):
+                        continue
+                    still = orders - (state[DELIVERIES] - served)
+                    total = float(then)
+                    if still > 0:
+                        total += to_go(brain, state, still, ahead, summed)
+                    new = _place(search, then, total)
+                    if new >= 0:
+                        search.states[new] = state
+                        search.parents[new] = node
+                        search.legs[new, :length] = leg[:length]
+                        search.lengths[new] = length
+                        search.totals[new] = total
+    if best_end >= 0:
+        return best_end, True
+    return best_node, False
+
+
+@njit(cache=True)
+def _rate_pairs(
+    brain: Brain, state: NDArray[int16], orders: int, options: NDArray[int16], rated: NDArray[float32],
+    which: NDArray[int64], summed: NDArray[int16], ahead: NDArray[int16],
+) -> int:  # fmt: skip
+    """How many pairs of subtasks there are; fills their estimates and (kind, cell, kind, cell)."""
+    count = 0
+    pose0, pose1 = _pose(brain, state, 0), _pose(brain, state, 1)
+    for kind0 in range(KINDS):
+        for place0 in range(max(1, options[0, kind0, 0])):
+            if kind0 != WAIT and options[0, kind0, 0] == 0:
+                continue
+            cell0 = options[0, kind0, 1 + place0] if kind0 != WAIT else 0
+            for kind1 in range(KINDS):
+                for place1 in range(max(1, options[1, kind1, 0])):
+                    if (kind1 != WAIT and options[1, kind1, 0] == 0) or (kind0 == WAIT and kind1 == WAIT):
+                        continue
+                    cell1 = options[1, kind1, 1 + place1] if kind1 != WAIT else 0
+                    goal0 = FREE if kind0 == WAIT else 1 + cell0
+                    goal1 = FREE if kind1 == WAIT else 1 + cell1
+                    own0 = 0 if kind0 == WAIT else _alone(brain, state, 0, cell0)
+                    own1 = 0 if kind1 == WAIT else _alone(brain, state, 1, cell1)
+                    together = joint_cost(brain.joint, goal0, goal1, pose0, pose1)
+                    delay = 2 if together >= FAR else together - max(own0, own1)
+                    if brain.pots[1]:
+                        rated[count] = own0 + own1 + delay + 30 * ((kind0 == WAIT) + (kind1 == WAIT))
+                    else:
+                        rated[count] = pair_to_go(brain, state, orders, kind0, cell0, kind1, cell1, delay)
+                    which[count, 0] = kind0
+                    which[count, 1] = cell0
+                    which[count, 2] = kind1
+                    which[count, 3] = cell1
+                    count += 1
+    return count
