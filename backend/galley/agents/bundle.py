@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
@@ -18,7 +18,9 @@ from galley.errors import GalleyError, InvalidFiles, Problem
 from galley.files import FileModel, Loaded, load
 from galley.kitchen import ENCODINGS, Encoder, Layout
 from galley.names import name_fix
+from galley.planning.centralized import Centralized
 from galley.planning.myopic import Myopic
+from galley.planning.robots import MDP, QMDP
 
 Kind = Literal["network", "planner", "scripted"]
 
@@ -26,8 +28,20 @@ POLICIES: Final[Mapping[str, tuple[Kind, frozenset[str]]]] = {
     "stay": ("scripted", frozenset()),
     "random": ("scripted", frozenset()),
     "myopic": ("planner", frozenset({"epsilon"})),
+    "centralized": ("planner", frozenset()),
+    "mdp": ("planner", frozenset()),
+    "qmdp": ("planner", frozenset()),
 }
 """What `params: {policy: NAME}` may name: the kind of agent and the other parameters of each policy."""
+
+_PLAIN: Final[Mapping[str, Callable[[], Agent]]] = {
+    "stay": Stay,
+    "random": Random,
+    "centralized": Centralized,
+    "mdp": MDP,
+    "qmdp": QMDP,
+}
+"""The policies without parameters."""
 
 _FILE: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 
@@ -71,7 +85,7 @@ class Bundle:
         policy = params.pop("policy")
         if policy == "myopic":
             return Myopic(epsilon=float(params.get("epsilon", 0.0)))
-        return Stay() if policy == "stay" else Random()
+        return _PLAIN[str(policy)]()
 
     def network(self, layout: Layout) -> tuple[Network, Encoder]:
         """The network for a layout and the encoder of its observations, loaded once.
