@@ -1,11 +1,11 @@
-"""The store as the server uses it, on real SQLite files."""
+"""The store as the server uses it, on either kind of database."""
 
 from __future__ import annotations
 
 import asyncio
+import json
 import sqlite3
 import time
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
@@ -13,32 +13,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from sqlalchemy import event, text
-from sqlalchemy.exc import OperationalError
+from sqlalchemy.exc import DBAPIError
 
 from galley.errors import GalleyError
 from galley.records import ClockRow, KeyRow, PauseRow, Store
 from galley.study.questionnaire import Questionnaire
+from tests.records.databases import Database
 from tests.records.helpers import START_MS, begin, joint_actions, one_soup, open_round, play, tick_rows
-
-
-@pytest.fixture
-def file(tmp_path: Path) -> Path:
-    return tmp_path / "deep" / "galley.sqlite"
-
-
-@pytest.fixture
-def store(file: Path) -> Iterator[Store]:
-    with Store.open(file, serving=True) as opened:
-        yield opened
-
-
-def rows(file: Path, query: str) -> list[tuple[object, ...]]:
-    """What another program reads from the file meanwhile."""
-    connection = sqlite3.connect(file)
-    try:
-        return connection.execute(query).fetchall()
-    finally:
-        connection.close()
 
 
 def test_a_visit_is_found_by_its_token_alone(store: Store) -> None:
@@ -56,21 +37,21 @@ def test_a_visit_is_found_by_its_token_alone(store: Store) -> None:
     assert store.visit("no such token").result() is None
 
 
-def test_visit_numbers_are_never_given_out_twice(store: Store, file: Path) -> None:
+def test_visit_numbers_are_never_given_out_twice(store: Store, database: Database) -> None:
     with ThreadPoolExecutor(8) as pool:
         numbers = list(pool.map(lambda _: store.next_visit_no("demo").result(), range(40)))
     assert sorted(numbers) == list(range(40))
     assert store.next_visit_no("other").result() == 0
     store.close()
-    with Store.open(file) as again:
+    with Store.open(database.url) as again:
         assert again.next_visit_no("demo").result() == 40
 
 
-def test_answers_are_in_the_file_once_acknowledged(store: Store, file: Path) -> None:
+def test_answers_are_in_the_file_once_acknowledged(store: Store, database: Database) -> None:
     visit = begin(store)
     answers = {"ease": 5, "why": "=cmd()", "which": ["a", "b"], "left_out": None}
     assert store.save_answers(visit.id, "survey", answers, 1, "active", START_MS + 9).result()
-    stored = rows(file, "SELECT item, value, position FROM responses ORDER BY position")
+    stored = database.rows("SELECT item, value, position FROM responses ORDER BY position")
     assert stored == [
         ("ease", "5", 1),
         ("why", '"=cmd()"', 2),
@@ -82,14 +63,14 @@ def test_answers_are_in_the_file_once_acknowledged(store: Store, file: Path) -> 
     assert (after.step_index, after.status, after.ended_ms) == (1, "active", None)
 
 
-def test_the_same_form_sent_twice_counts_once(store: Store, file: Path) -> None:
+def test_the_same_form_sent_twice_counts_once(store: Store, database: Database) -> None:
     visit = begin(store)
     store.enter_step(visit.id, "survey", START_MS).result()
     store.enter_step(visit.id, "survey", START_MS + 5).result()
     assert store.save_answers(visit.id, "survey", {"ease": 5}, 1, "active", START_MS + 9).result() is True
     assert store.save_answers(visit.id, "survey", {"ease": 1}, 1, "active", START_MS + 10).result() is False
-    assert rows(file, "SELECT value FROM responses") == [("5",)]
-    assert rows(file, "SELECT entered_ms, left_ms, views FROM stages") == [(START_MS, START_MS + 9, 2)]
+    assert database.rows("SELECT value FROM responses") == [("5",)]
+    assert database.rows("SELECT entered_ms, left_ms, views FROM stages") == [(START_MS, START_MS + 9, 2)]
 
 
 def test_the_last_step_ends_the_visit_with_its_code(store: Store) -> None:
@@ -100,7 +81,7 @@ def test_the_last_step_ends_the_visit_with_its_code(store: Store) -> None:
     assert (after.status, after.completion_code, after.ended_ms) == ("completed", "DONE", START_MS + 9)
 
 
-def test_items_are_kept_as_they_were_shown(store: Store, file: Path) -> None:
+def test_items_are_kept_as_they_were_shown(store: Store, database: Database) -> None:
     visit = begin(store)
     item = {
         "id": "ease",
@@ -112,8 +93,8 @@ def test_items_are_kept_as_they_were_shown(store: Store, file: Path) -> None:
     }
     asked = Questionnaire.model_validate({"format": 1, "title": "T", "source": "S", "items": (item,)})
     store.save_answers(visit.id, "survey", {"ease": 5}, 1, "active", START_MS, questionnaire=asked).result()
-    shown = rows(file, "SELECT json_extract(shown, '$.text'), json_extract(shown, '$.scale') FROM responses")
-    assert shown == [("Easy?", 7)]
+    ((shown,),) = database.rows("SELECT shown FROM responses")
+    assert (json.loads(shown)["text"], json.loads(shown)["scale"]) == ("Easy?", 7)
 
 
 def test_a_round_is_set_up_once_per_step(store: Store) -> None:
@@ -152,7 +133,7 @@ def test_an_open_round_comes_back_with_all_that_was_journalled(store: Store) -> 
     assert row.seed == 2**63 + 5
 
 
-def test_a_tick_written_twice_is_the_same_tick(store: Store, file: Path) -> None:
+def test_a_tick_written_twice_is_the_same_tick(store: Store, database: Database) -> None:
     round_id = open_round(store, begin(store))
     ticks = tick_rows(joint_actions(1, 5))
     keys = [KeyRow(1, "up", True, 1.25, START_MS + 3.5, 0, 1)]
@@ -162,43 +143,45 @@ def test_a_tick_written_twice_is_the_same_tick(store: Store, file: Path) -> None
         store.journal(round_id, ticks[2:], keys, [], pings)
         store.flush().result()
     assert store.health().ok
-    assert rows(file, "SELECT count(*), max(tick) FROM ticks") == [(5, 4)]
-    assert rows(file, "SELECT count(*) FROM keys") == [(1,)]
-    assert rows(file, "SELECT count(*) FROM clocks") == [(1,)]
+    assert database.rows("SELECT count(*), max(tick) FROM ticks") == [(5, 4)]
+    assert database.rows("SELECT count(*) FROM keys") == [(1,)]
+    assert database.rows("SELECT count(*) FROM clocks") == [(1,)]
 
 
-def test_a_page_that_was_reloaded_counts_its_keys_anew(store: Store, file: Path) -> None:
+def test_a_page_that_was_reloaded_counts_its_keys_anew(store: Store, database: Database) -> None:
     round_id = open_round(store, begin(store))
     for arrival in (START_MS + 1.0, START_MS + 900.0):
         store.journal(round_id, keys=[KeyRow(1, "up", True, 1.0, arrival, 0, 1)])
     store.flush().result()
-    assert rows(file, "SELECT count(*) FROM keys") == [(2,)]
+    assert database.rows("SELECT count(*) FROM keys") == [(2,)]
 
 
-def test_a_pause_learns_its_end_and_keeps_it(store: Store, file: Path) -> None:
+def test_a_pause_learns_its_end_and_keeps_it(store: Store, database: Database) -> None:
     round_id = open_round(store, begin(store))
     began = PauseRow(7, START_MS + 1.5, None, "left")
     over = PauseRow(7, START_MS + 1.5, START_MS + 99.0, "left")
     store.journal(round_id, pauses=[began])
     store.flush().result()
-    assert rows(file, "SELECT ended_ms FROM pauses") == [(None,)]
+    assert database.rows("SELECT ended_ms FROM pauses") == [(None,)]
     store.journal(round_id, pauses=[over, began])
     store.flush().result()
-    assert rows(file, "SELECT started_ms, ended_ms FROM pauses") == [(START_MS + 1.5, START_MS + 99.0)]
+    assert database.rows("SELECT started_ms, ended_ms FROM pauses") == [(START_MS + 1.5, START_MS + 99.0)]
 
 
-def test_finishing_a_round_writes_the_rest_of_its_journal(store: Store, file: Path) -> None:
+def test_finishing_a_round_writes_the_rest_of_its_journal(store: Store, database: Database) -> None:
     visit = begin(store)
     round_id = open_round(store, visit)
     kitchen = play(store, round_id, one_soup())
     assert kitchen.score == 20
-    assert rows(file, "SELECT count(*) FROM ticks") == [(40,)]
-    assert rows(file, "SELECT status, score, deliveries FROM rounds") == [("finished", 20, 1)]
+    assert database.rows("SELECT count(*) FROM ticks") == [(40,)]
+    assert database.rows("SELECT status, score, deliveries FROM rounds") == [("finished", 20, 1)]
     assert store.finish_round(round_id, "abandoned", 0, 0, START_MS, b"").result() is False
-    assert rows(file, "SELECT status, score, deliveries FROM rounds") == [("finished", 20, 1)]
+    assert database.rows("SELECT status, score, deliveries FROM rounds") == [("finished", 20, 1)]
 
 
-def test_futures_can_be_awaited_and_outlive_a_request_that_was_given_up(store: Store, file: Path) -> None:
+def test_futures_can_be_awaited_and_outlive_a_request_that_was_given_up(
+    store: Store, database: Database
+) -> None:
     visit = begin(store)
 
     async def leave_at_once() -> None:
@@ -211,21 +194,21 @@ def test_futures_can_be_awaited_and_outlive_a_request_that_was_given_up(store: S
 
     asyncio.run(leave_at_once())
     store.flush().result()
-    assert rows(file, "SELECT value FROM responses") == [("5",)]
+    assert database.rows("SELECT value FROM responses") == [("5",)]
 
 
-def test_the_journal_reaches_the_file_by_itself(store: Store, file: Path) -> None:
+def test_the_journal_reaches_the_file_by_itself(store: Store, database: Database) -> None:
     round_id = open_round(store, begin(store))
     store.journal(round_id, tick_rows(joint_actions(1, 3)))
     patience = time.monotonic() + 20
-    while not rows(file, "SELECT count(*) FROM ticks")[0][0] and time.monotonic() < patience:
+    while not database.rows("SELECT count(*) FROM ticks")[0][0] and time.monotonic() < patience:
         time.sleep(0.02)
-    assert rows(file, "SELECT count(*) FROM ticks") == [(3,)]
+    assert database.rows("SELECT count(*) FROM ticks") == [(3,)]
 
 
-def test_many_ticks_make_few_transactions(file: Path) -> None:
+def test_many_ticks_make_few_transactions(database: Database) -> None:
     commits = []
-    with Store.open(file, flush_every_s=600) as store:
+    with Store.open(database.url, flush_every_s=600) as store:
         event.listen(store._engine, "commit", commits.append)
         round_id = open_round(store, begin(store))
         commits.clear()
@@ -235,13 +218,13 @@ def test_many_ticks_make_few_transactions(file: Path) -> None:
     assert len(commits) == 1
 
 
-def test_closing_writes_what_waits_and_refuses_more(file: Path) -> None:
-    store = Store.open(file, flush_every_s=600)
+def test_closing_writes_what_waits_and_refuses_more(database: Database) -> None:
+    store = Store.open(database.url, flush_every_s=600)
     round_id = open_round(store, begin(store))
     store.journal(round_id, tick_rows(joint_actions(1, 3)))
     store.close()
     store.close()
-    assert rows(file, "SELECT count(*) FROM ticks") == [(3,)]
+    assert database.rows("SELECT count(*) FROM ticks") == [(3,)]
     with pytest.raises(GalleyError, match="closed"):
         store.journal(round_id, tick_rows(joint_actions(1, 3)))
     with pytest.raises(GalleyError, match="closed"):
@@ -250,6 +233,9 @@ def test_closing_writes_what_waits_and_refuses_more(file: Path) -> None:
 
 def test_what_is_acknowledged_is_synced(store: Store) -> None:
     with store._engine.connect() as connection:
+        if connection.dialect.name == "postgresql":
+            assert connection.exec_driver_sql("SHOW synchronous_commit").scalar() == "on"
+            return
         full = 2
         assert connection.exec_driver_sql("PRAGMA synchronous").scalar() == full
         assert connection.exec_driver_sql("PRAGMA journal_mode").scalar() == "wal"
@@ -263,7 +249,7 @@ def test_readers_see_one_moment_and_cannot_write(store: Store) -> None:
         assert connection.execute(count).scalar() == 1
         begin(store)
         assert connection.execute(count).scalar() == 1
-        with pytest.raises(OperationalError, match="readonly"):
+        with pytest.raises(DBAPIError, match=r"read-?only"):
             connection.execute(text("DELETE FROM visits"))
 
 

@@ -8,11 +8,13 @@ from typing import Any
 from sqlalchemy import Engine, Table, create_engine, event
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.engine import URL, make_url
-from sqlalchemy.exc import ArgumentError, NoSuchModuleError
+from sqlalchemy.exc import ArgumentError
 
 from galley.errors import GalleyError
 
 BUSY_MS = 10_000
+CONNECT_S = 5
+POSTGRESQL = "postgresql+psycopg"
 FORMS = "sqlite:///FILE or postgresql://HOST/NAME"
 
 
@@ -29,9 +31,11 @@ def database_url(database: str | Path) -> URL:
         kind = url.get_backend_name()
     except ArgumentError:
         raise GalleyError(f"database {text!r} is not a URL; write {FORMS}") from None
-    if kind not in ("sqlite", "postgresql"):
+    if kind in ("postgresql", "postgres"):
+        return url.set(drivername=POSTGRESQL)
+    if kind != "sqlite":
         raise GalleyError(f"database kind {kind!r} is not supported; use {FORMS}")
-    if kind == "sqlite" and url.database in (None, "", ":memory:"):
+    if url.database in (None, "", ":memory:"):
         raise GalleyError("records need a file, not a database in memory; write sqlite:///FILE")
     return url
 
@@ -54,9 +58,10 @@ def connect(url: URL, *, writes: bool, migrates: bool = False) -> Engine:
     try:
         if url.get_backend_name() == "sqlite":
             return _sqlite(url, writes, migrates)
-        return create_engine(url, pool_pre_ping=True)
-    except (NoSuchModuleError, ModuleNotFoundError) as missing:
-        raise GalleyError(f"database {shown(url)}: {missing}; pip install the driver") from None
+        return create_engine(url, pool_pre_ping=True, connect_args={"connect_timeout": CONNECT_S})
+    except ImportError as missing:
+        fix = "pip install 'galley[postgres]'"
+        raise GalleyError(f"database {shown(url)}: the driver is missing ({missing}); {fix}") from None
 
 
 def _sqlite(url: URL, writes: bool, migrates: bool) -> Engine:
@@ -69,6 +74,8 @@ def _sqlite(url: URL, writes: bool, migrates: bool) -> Engine:
         for pragma in (
             "journal_mode = WAL",
             "synchronous = FULL",
+            # What is deleted is overwritten, so that an erased person is gone from the file as well.
+            "secure_delete = ON",
             # A migration may rebuild a table; to drop the old one must not delete what points at it.
             f"foreign_keys = {'OFF' if migrates else 'ON'}",
             f"query_only = {'OFF' if writes else 'ON'}",

@@ -14,6 +14,15 @@ from galley.records.queries import visit_row
 from galley.records.rows import VisitRow
 from galley.records.tables import RESPONSES, ROUNDS, SEATS, STAGES, STUDIES, VISITS
 
+NEW_VISIT: dict[str, Any] = {
+    **dict.fromkeys(("completion_code", "ended_ms", "slot", "consent_sha256", "person")),
+    "step_index": 0,
+    "status": "active",
+    "test": False,
+    "language": "en",
+    "tries": 0,
+}
+
 
 def next_visit_no(connection: Connection, study: str) -> int:
     """The next number of a study, given out for good."""
@@ -27,7 +36,7 @@ def next_visit_no(connection: Connection, study: str) -> int:
 def create_visit(connection: Connection, values: Mapping[str, Any]) -> VisitRow:
     """The visit with these values, at its first step."""
     _meet(connection, values["study"])
-    whole = {**values, "step_index": 0, "status": "active", "completion_code": None, "ended_ms": None}
+    whole = {**NEW_VISIT, "last_seen_ms": values["created_ms"], **values}
     return visit_row({"id": _new_id(connection, VISITS, whole), **whole})
 
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from sqlalchemy import Connection, Table, select
 
 from galley.errors import GalleyError
-from galley.records.rows import RoundRow, SeatRow, VisitRow
-from galley.records.tables import ROUNDS, SEATS, TICKS, VISITS
+from galley.records.rows import RoundRow, SeatRow, StandInRow, VisitRow
+from galley.records.tables import ROUNDS, SEATS, STAND_INS, TICKS, VISITS
 
 
 def studies(connection: Connection) -> tuple[str, ...]:
@@ -82,6 +82,10 @@ def round_row(connection: Connection, round_id: int) -> RoundRow:
         **{**found, "seed": int(found["seed"])},
         seats=tuple(SeatRow(**{name: row[name] for name in SeatRow.__slots__}) for row in seats),
         joint_actions=joint_actions(connection, round_id),
+        stand_ins=tuple(
+            StandInRow(**{name: row[name] for name in StandInRow.__slots__})
+            for row in of_round(connection, STAND_INS, round_id)
+        ),
     )
 
 

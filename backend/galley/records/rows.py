@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,23 +29,110 @@ class VisitRow:
     completion_code: str | None
     created_ms: int
     ended_ms: int | None
+    slot: int | None = None
+    test: bool = False
+    language: str = "en"
+    tries: int = 0
+    consent_sha256: str | None = None
+    person: str | None = None
+    last_seen_ms: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Arrival:
+    """Somebody who opens a study's link and begins.
+
+    `person` is who the link says that this is; with `once` a person has one visit only.
+    """
+
+    study: str
+    study_sha256: str
+    at_ms: float
+    link_params: Mapping[str, str] = field(default_factory=dict)
+    language: str = "en"
+    person: str | None = None
+    once: bool = False
+    test: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Planned:
+    """What a new visit will meet, as the study plans it."""
+
+    seed: int
+    plan_json: str
+    condition: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class SlotRow:
+    """A slot that was given out: `completed` by its visit, or `ended` without, or on its way."""
+
+    number: int
+    cell: dict[str, Any]
+    completed: bool
+    ended: bool
+    last_seen_ms: int
+    visit_id: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Begun:
+    """What came of an arrival: a visit, or why there is none.
+
+    `why`: `new`; `again`, the visit that this person had before; `full`, every slot is completed; `later`,
+    all slots are taken, some of them by visits that may still give theirs back; `paused`; `closed`.
+    """
+
+    visit: VisitRow | None
+    why: Literal["new", "again", "full", "later", "paused", "closed"]
 
 
 @dataclass(frozen=True, slots=True)
 class SeatRow:
-    """Who sits at one seat of a round: a visit or an agent."""
+    """Who sits at one seat of a round: a visit at a step of its plan, or an agent; neither once erased."""
 
     seat: int
     visit_id: int | None
     step_id: str | None
-    agent: str | None
-    agent_sha256: str | None
-    hat: str | None
+    agent: str | None = None
+    agent_sha256: str | None = None
+    hat: str | None = None
+    rtt_median_ms: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class NewRound:
+    """A round to be set up; `horizon_ticks` is the length of each of its episodes."""
+
+    round_no: int
+    layout: str
+    layout_json: str
+    horizon_ticks: int
+    tick_ms: int
+    seed: int
+    at_ms: float
+    seats: tuple[SeatRow, SeatRow]
+    episodes: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class StandInRow:
+    """An agent that plays a person's seat from a tick on."""
+
+    seat: int
+    tick: int
+    agent: str
+    agent_sha256: str
+    at_ms: int
 
 
 @dataclass(frozen=True, slots=True)
 class RoundRow:
-    """One round with its joint actions so far, uint8 [T, 2]: enough to go on with it by replaying."""
+    """One round with its joint actions so far, uint8 [T, 2]: enough to go on with it by replaying.
+
+    Ticks are counted on through all episodes; `horizon_ticks` is the length of one.
+    """
 
     id: int
     study: str
@@ -62,6 +150,11 @@ class RoundRow:
     ended_ms: int | None
     seats: tuple[SeatRow, ...]
     joint_actions: NDArray[np.uint8] = field(compare=False)
+    episodes: int = 1
+    stand_ins: tuple[StandInRow, ...] = ()
+    played_ticks: int | None = None
+    late_ticks: int | None = None
+    fault_ticks: int | None = None
 
     @property
     def human(self) -> SeatRow:
@@ -128,10 +221,12 @@ class ClockRow:
 class Health:
     """How the writer fares. `ok` is False while writing fails, and for good once rows were lost.
 
-    `waiting_rows` are journalled but not yet committed; `lost_rows` the database refused for good.
+    `waiting_rows` are journalled but not yet committed; `lost_rows` the database refused for good;
+    `fenced_rows` came for rounds that another server had taken over, which is no fault.
     """
 
     ok: bool
     message: str
     waiting_rows: int
     lost_rows: int
+    fenced_rows: int = 0

@@ -17,6 +17,7 @@ from sqlalchemy import (
     Float,
     ForeignKey,
     ForeignKeyConstraint,
+    Index,
     Integer,
     MetaData,
     SmallInteger,
@@ -58,7 +59,19 @@ class Json(TypeDecorator[Any]):
 # SQLite only numbers rows by itself when the key's type is exactly INTEGER.
 _ROW_ID = BigInteger().with_variant(Integer, "sqlite")
 _Type = TypeEngine[Any] | type[TypeEngine[Any]]
-VISIT_STATUSES = ("active", "completed", "declined", "abandoned")
+VISIT_STATUSES = (
+    "active",
+    "completed",
+    "declined",
+    "screened_out",
+    "failed_checks",
+    "timed_out",
+    "expired",
+    "partner_missing",
+    "abandoned",
+)
+STUDY_STATES = ("open", "paused", "closed")
+SLOT_STATES = ("held", "completed")
 ROUND_STATUSES = ("open", "finished", "abandoned", "skipped")
 
 
@@ -77,6 +90,8 @@ STUDIES = Table(
     METADATA,
     _of("name", String(200), "name of the study file, without .yaml", primary_key=True),
     _of("visits_begun", Integer, "visit numbers given out so far"),
+    _of("state", String(10), "whether it takes new visits: " + ", ".join(STUDY_STATES), default="open"),
+    _of("state_ms", BigInteger, "when a researcher last changed that", nullable=True),
     info={"meaning": "one row per study that anybody has visited"},
 )
 
@@ -103,8 +118,36 @@ VISITS = Table(
     _of("completion_code", String(200), "code shown at the end, once it was reached", nullable=True),
     _of("created_ms", BigInteger, "when the visit began"),
     _of("ended_ms", BigInteger, "when the visit stopped being active", nullable=True),
+    _of("slot", Integer, "number of the slot it was given; empty if it took none", nullable=True),
+    _of("test", Boolean, "made to try the study out: it takes no slot and counts nowhere", default=False),
+    _of("language", String(20), "language that the pages were shown in", default="en"),
+    _of("tries", Integer, "failed attempts at the quiz it is at", default=0),
+    _of("consent_sha256", String(64), "hash of the exact text that was agreed to", nullable=True),
+    _of("person", String(300), "who says the link that this is, to know a person again", nullable=True),
+    _of("last_seen_ms", BigInteger, "last sign of life", default=0),
     UniqueConstraint("study", "visit_no"),
+    Index("ix_visits_study_person", "study", "person"),
     info={"meaning": "one row per pass of a participant through a study"},
+    sqlite_autoincrement=True,  # an id is never given out again, not even after its visit was erased
+)
+
+SLOTS = Table(
+    "slots",
+    METADATA,
+    _of("study", String(200), "name of the study", ForeignKey("studies.name"), primary_key=True),
+    _of("number", Integer, "number of the slot, from 0", primary_key=True, autoincrement=False),
+    _of("cell", Json, "factor: level, the cell of the design that the slot belongs to"),
+    _of("state", String(10), "one of: " + ", ".join(SLOT_STATES)),
+    _of(
+        "visit_id",
+        _ROW_ID,
+        "the visit that has it; empty once that was erased",
+        ForeignKey("visits.id", ondelete="SET NULL"),
+        nullable=True,
+    ),
+    _of("held_at_ms", BigInteger, "when it was given to that visit"),
+    Index("ix_slots_visit_id", "visit_id"),
+    info={"meaning": "one row per place in a study's design; places of people who leave are given out again"},
 )
 
 STAGES = Table(
@@ -128,7 +171,55 @@ RESPONSES = Table(
     _of("value", Json, "the answer: a number, a text, an option, a list of options, or null if left open"),
     _of("shown", Json, "the item as it was shown: kind, text, options or scale; null if it is unknown"),
     _of("at_ms", BigInteger, "when the answer was stored"),
+    _of("passed", Boolean, "answered as expected; empty unless the item is a check", nullable=True),
     info={"meaning": "one row per answered item"},
+)
+
+ATTEMPTS = Table(
+    "attempts",
+    METADATA,
+    _of("visit_id", _ROW_ID, "the visit", ForeignKey("visits.id", ondelete="CASCADE"), primary_key=True),
+    _of("step_id", String(200), "the quiz", primary_key=True),
+    _of("attempt", Integer, "which failed attempt, from 1", primary_key=True, autoincrement=False),
+    _of("answers", Json, "item: answer"),
+    _of("wrong", Json, "the items that were not answered as expected"),
+    _of("at_ms", BigInteger, "when it was sent"),
+    info={"meaning": "one row per failed attempt at a quiz; the attempt that went on is in responses"},
+)
+
+ABSENCES = Table(
+    "absences",
+    METADATA,
+    _of("visit_id", _ROW_ID, "the visit", ForeignKey("visits.id", ondelete="CASCADE"), primary_key=True),
+    _of("started_ms", BigInteger, "when the page was hidden", primary_key=True, autoincrement=False),
+    _of("ended_ms", BigInteger, "when it was shown again; empty while it is not", nullable=True),
+    _of("step_id", String(200), "the step it happened at"),
+    info={"meaning": "one row per time that a participant's page was hidden behind another tab or window"},
+)
+
+NOTES = Table(
+    "notes",
+    METADATA,
+    _of("id", _ROW_ID, "the note, numbered by the server", primary_key=True, autoincrement=True),
+    _of("visit_id", _ROW_ID, "the visit", ForeignKey("visits.id", ondelete="CASCADE"), index=True),
+    _of("author", String(200), "name of the researcher"),
+    _of("text", Text, "what the researcher wrote"),
+    _of("at_ms", BigInteger, "when"),
+    info={"meaning": "one row per note of a researcher about a visit"},
+)
+
+QUESTIONS = Table(
+    "questions",
+    METADATA,
+    _of("study", String(200), "name of the study", ForeignKey("studies.name"), primary_key=True),
+    _of("step_id", String(200), "the step; empty for a factor of the design", primary_key=True),
+    _of("item", String(200), "the item, or the factor; empty for a round", primary_key=True),
+    _of("place", Integer, "place of the step in the first plan that came to it"),
+    _of("position", Integer, "place of the item on its page, from 1"),
+    info={
+        "meaning": "one row per column of the wide export: what anybody was asked, whose answers or not, so "
+        "that erasing a person leaves the columns of all others as they are"
+    },
 )
 
 ROUNDS = Table(
@@ -148,7 +239,22 @@ ROUNDS = Table(
     _of("final_sha256", String(64), "hash of the last state (its int16 row, little-endian)", nullable=True),
     _of("created_ms", BigInteger, "when the round was set up"),
     _of("ended_ms", BigInteger, "when the round ended", nullable=True),
+    _of("episodes", Integer, "episodes, one after the other, each from the start", default=1),
+    _of("played_ticks", Integer, "ticks played, counted at its end", nullable=True),
+    _of("late_ticks", Integer, "of these, the agent did not answer in time", nullable=True),
+    _of("fault_ticks", Integer, "of these, the agent's decision could not be used", nullable=True),
     info={"meaning": "one row per round"},
+    sqlite_autoincrement=True,
+)
+
+LEASES = Table(
+    "leases",
+    METADATA,
+    _of_round(primary_key=True),
+    _of("owner", String(64), "the serving process that plays the round; empty if none", nullable=True),
+    _of("number", Integer, "grows each time the round changes hands; only the last may write"),
+    _of("expires_ms", BigInteger, "until when it is the owner's, by the database's clock"),
+    info={"meaning": "one row per round: which of several serving processes it belongs to"},
 )
 
 SEATS = Table(
@@ -156,14 +262,27 @@ SEATS = Table(
     METADATA,
     _of_round(primary_key=True),
     _of("seat", SmallInteger, "which chef: 0 or 1", primary_key=True, autoincrement=False),
-    _of("visit_id", _ROW_ID, "the visit that plays here; empty for an agent", nullable=True),
-    _of("step_id", String(200), "the step of that visit's plan; empty for an agent", nullable=True),
+    _of("visit_id", _ROW_ID, "the visit that plays here; empty for an agent or if erased", nullable=True),
+    _of("step_id", String(200), "the step of that visit's plan; empty as above", nullable=True),
     _of("agent", String(200), "name of the agent that plays here; empty for a person", nullable=True),
     _of("agent_sha256", String(64), "hash of the agent's bundle; empty for a person", nullable=True),
     _of("hat", String(40), "colour of the hat", nullable=True),
+    _of("rtt_median_ms", Float, "median round-trip time, counted at the round's end", nullable=True),
     ForeignKeyConstraint(["visit_id"], ["visits.id"], ondelete="CASCADE"),
     UniqueConstraint("visit_id", "step_id"),
     info={"meaning": "two rows per round: who sat where"},
+)
+
+STAND_INS = Table(
+    "stand_ins",
+    METADATA,
+    _of_round(primary_key=True),
+    _of("seat", SmallInteger, "seat of the person who left", primary_key=True, autoincrement=False),
+    _of("tick", Integer, "first tick that the agent played"),
+    _of("agent", String(200), "name of the agent"),
+    _of("agent_sha256", String(64), "hash of the agent's bundle"),
+    _of("at_ms", BigInteger, "when it took over"),
+    info={"meaning": "one row per agent that took the seat of a person who left a round for two"},
 )
 
 # Clustered by key in SQLite: one tree to write to, and a round's ticks lie side by side to be read.
@@ -225,4 +344,32 @@ CLOCKS = Table(
     _of("rtt_ms", Float, "round-trip time that the browser measured with its last ping", nullable=True),
     info={"meaning": "one row per ping: relates the browser's clock to the server's"},
     sqlite_with_rowid=False,
+)
+
+RESEARCHERS = Table(
+    "researchers",
+    METADATA,
+    _of("id", _ROW_ID, "the researcher, numbered by the server", primary_key=True, autoincrement=True),
+    _of("name", String(200), "name to log in with", unique=True),
+    _of("password_hash", String(300), "salted hash of the password"),
+    _of("created_ms", BigInteger, "when the account was made"),
+    info={"meaning": "one row per researcher who may log in"},
+    sqlite_autoincrement=True,
+)
+
+SESSIONS = Table(
+    "sessions",
+    METADATA,
+    _of("token_sha256", String(64), "hash of the secret in the researcher's cookie", primary_key=True),
+    _of(
+        "researcher_id",
+        _ROW_ID,
+        "the researcher",
+        ForeignKey("researchers.id", ondelete="CASCADE"),
+        index=True,
+    ),
+    _of("csrf", String(64), "secret that each of the session's forms carries"),
+    _of("created_ms", BigInteger, "when the researcher logged in"),
+    _of("expires_ms", BigInteger, "when the session ends by itself"),
+    info={"meaning": "one row per researcher's login"},
 )
