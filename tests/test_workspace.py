@@ -11,7 +11,7 @@ from galley.workspace import KINDS, Workspace
 
 @pytest.fixture
 def workspace(tmp_path: Path) -> Workspace:
-    for folder in ("layouts", "agents/bold", "agents/shy", "questionnaires/texts", "studies"):
+    for folder in ("layouts", "agents/bold", "agents/shy", "questionnaires/texts", "studies", "invitations"):
         (tmp_path / folder).mkdir(parents=True)
     for file in (
         "layouts/ring.yaml",
@@ -22,6 +22,7 @@ def workspace(tmp_path: Path) -> Workspace:
         "questionnaires/after.yaml",
         "questionnaires/texts/consent.md",
         "studies/first.yaml",
+        "invitations/wave-1.txt",
     ):
         (tmp_path / file).write_text("")
     return Workspace(tmp_path)
@@ -34,6 +35,7 @@ def test_things_are_found_by_name(workspace: Workspace) -> None:
         ("after",),
         ("consent",),
         ("first",),
+        ("wave-1",),
     ]
     assert workspace.find("layouts", "ring") == workspace.path / "layouts" / "ring.yaml"
     assert workspace.find("agents", "shy") == workspace.path / "agents" / "shy"

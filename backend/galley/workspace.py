@@ -9,7 +9,7 @@ from typing import Final, Literal, get_args
 from galley.errors import GalleyError
 from galley.names import name_fix
 
-Kind = Literal["layouts", "agents", "questionnaires", "texts", "studies"]
+Kind = Literal["layouts", "agents", "questionnaires", "texts", "studies", "invitations"]
 KINDS: Final[tuple[Kind, ...]] = get_args(Kind)
 
 NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
@@ -21,6 +21,7 @@ _PLACES: Final[dict[Kind, tuple[str, str]]] = {
     "questionnaires": ("questionnaires", ".yaml"),
     "texts": ("questionnaires/texts", ".md"),
     "studies": ("studies", ".yaml"),
+    "invitations": ("invitations", ".txt"),
 }
 
 
@@ -48,6 +49,11 @@ class Workspace:
     def database(self) -> str:
         """URL of the workspace's own records, for when no other database is named."""
         return f"sqlite:///{self.path.resolve() / '.data' / 'galley.sqlite'}"
+
+    @staticmethod
+    def suffix(kind: Kind) -> str:
+        """How the files of this kind end; empty for agents, which are folders."""
+        return _PLACES[kind][1]
 
     def folder(self, kind: Kind) -> Path:
         """The folder in which things of this kind lie; it need not exist."""

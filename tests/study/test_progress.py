@@ -13,16 +13,20 @@ from galley.study.progress import (
     Agreed,
     Continued,
     Declined,
+    Ended,
     Happening,
     Progress,
     Refusal,
     RoundEnded,
+    Skipped,
     Submitted,
+    TimedOut,
     next_progress,
 )
 
 KINDS: tuple[StepKind, ...] = (
-    "consent", "questionnaire", "instructions", "round", "round", "questionnaire", "comparison", "debrief"
+    "consent", "questionnaire", "instructions", "round", "round", "questionnaire", "comparison", "quiz",
+    "break", "debrief",
 )  # fmt: skip
 
 
@@ -30,6 +34,10 @@ def plan_of(*kinds: StepKind) -> Plan:
     steps = []
     for number, kind in enumerate(kinds):
         data: dict[str, Any] = {"skippable": number == 3} if kind == "round" else {}
+        if kind == "quiz":
+            data = {"tries": 2, "after_last": "end", "expected": {"q": 1}}
+        if kind == "screen_out":
+            data = {"when": [{"item": "s0.never", "any_of": [1]}]}
         steps.append(Step(f"s{number}", kind, "", data))
     return Plan("study", "", 0, 0, {}, {}, tuple(steps))
 
@@ -45,6 +53,9 @@ def all_happenings(step_id: str) -> list[Happening]:
         Continued(step_id),
         *(RoundEnded(step_id, outcome) for outcome in OUTCOMES),
         RoundEnded(step_id, "lost"),  # type: ignore[arg-type]
+        Skipped(step_id),
+        TimedOut(step_id),
+        Ended(step_id, "completed"),
     ]
 
 
@@ -53,9 +64,9 @@ def legal(step: Step) -> list[Happening]:
     match step.kind:
         case "consent":
             return [Agreed(step.id), Declined(step.id)]
-        case "questionnaire" | "comparison":
+        case "questionnaire" | "comparison" | "quiz":
             return [Submitted(step.id)]
-        case "instructions":
+        case "instructions" | "break":
             return [Continued(step.id)]
         case "round":
             ended: list[Happening] = [RoundEnded(step.id, "finished"), RoundEnded(step.id, "abandoned")]
@@ -88,11 +99,11 @@ def test_a_visit_that_is_over_stays_over(status: Any) -> None:
 
 
 def test_every_kind_of_step_is_covered() -> None:
-    assert set(KINDS) == set(STEP_KINDS)
+    assert {*KINDS, "screen_out"} == set(STEP_KINDS)
 
 
 anything = st.builds(
-    lambda n, which: all_happenings(f"s{n}")[which], st.integers(0, len(KINDS)), st.integers(0, 7)
+    lambda n, which: all_happenings(f"s{n}")[which], st.integers(0, len(KINDS)), st.integers(0, 10)
 )
 
 
@@ -135,7 +146,7 @@ def test_the_straight_way_through_ends_at_the_debrief() -> None:
 
 
 def test_any_two_kinds_in_a_row_work() -> None:
-    middle = [kind for kind in STEP_KINDS if kind not in ("consent", "debrief")]
+    middle = [kind for kind in STEP_KINDS if kind not in ("consent", "debrief", "screen_out")]
     for one, other in product(middle, middle):
         plan = plan_of("consent", one, other, "debrief")
         progress = Progress()

@@ -200,7 +200,7 @@ items:
         "bad.yaml:8: 'items' no. 4, 'options' is too short; it needs at least 2",
         (
             "bad.yaml:9: kind 'gauge' is unknown in 'items' no. 5; use one of comparison likert long_text "
-            "multiple_choice number short_text single_choice"
+            "multiple_choice number ranking semantic_differential short_text single_choice slider"
         ),
         "bad.yaml:10: 'min' 5 is above 'max' 1; exchange them",
         "bad.yaml:14: option 'x' stands twice; give each option its own value",

@@ -89,7 +89,7 @@ completion: {code: a b, redirect: http://x.org}
 stages:
   - {kind: consent, text: consnt}
   - {kind: questionnaire, questionnaire: before-gane}
-  - {kind: quiz, text: instructions}
+  - {kind: quizz, text: instructions}
   - {kind: tutorial, layout: simpel, agent: stya, horizon_ticks: 0}
   - kind: rounds
     agents: [random, myopia]
@@ -111,7 +111,7 @@ stages:
         "studies/mine.yaml:6: 'completion', 'redirect' 'http://x.org' has a form that is not allowed",
         "studies/mine.yaml:8: no text is named 'consnt'",
         "studies/mine.yaml:9: no questionnaire is named 'before-gane'",
-        "studies/mine.yaml:10: kind 'quiz' is unknown in 'stages' no. 3",
+        "studies/mine.yaml:10: kind 'quizz' is unknown in 'stages' no. 3",
         "studies/mine.yaml:11: 'stages' no. 4, 'horizon_ticks' 0 is out of range",
         "studies/mine.yaml:11: no agent is named 'stya'",
         "studies/mine.yaml:11: no layout is named 'simpel'",
@@ -178,7 +178,7 @@ def test_stages_must_fit_together(tmp_path: Path, old: str, new: str, line: int,
 def test_problems_of_the_named_files_come_together(tmp_path: Path) -> None:
     workspace = study_workspace(tmp_path / "w", GOOD)
     for file, old, new in [
-        ("questionnaires/after-round.yaml", "scale: 7", "scale: 70"),
+        ("questionnaires/after-round.yaml", "scale: 7", "scale: 700"),
         ("questionnaires/texts/debrief.md", "# Thank", "Thank"),
         ("layouts/counter_circuit.yaml", "format: 1", "format: 9"),
     ]:

@@ -6,7 +6,8 @@ import math
 from collections.abc import Iterator
 
 from galley.errors import InvalidFiles, Problem
-from galley.study.config import (
+from galley.study.questionnaire import load_questionnaire
+from galley.study.stages import (
     Comparison,
     Consent,
     Debrief,
@@ -16,7 +17,6 @@ from galley.study.config import (
     Tutorial,
     stage_ids,
 )
-from galley.study.questionnaire import load_questionnaire
 from galley.study.study import Study, known_layouts_of, load_study
 from galley.study.texts import load_text
 from galley.workspace import KINDS, NAME, Workspace
@@ -61,7 +61,7 @@ def _misplaced(workspace: Workspace) -> Iterator[Problem]:
         folder = workspace.folder(kind)
         if kind == "agents" or not folder.is_dir():
             continue
-        suffix = ".md" if kind == "texts" else ".yaml"
+        suffix = workspace.suffix(kind)
         for path in sorted(folder.iterdir()):
             if path.is_dir() or path.name.startswith("."):
                 continue

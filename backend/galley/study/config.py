@@ -1,146 +1,48 @@
-"""What a study file says, before anyone visits: settings and stages in order."""
+"""What a study file says, before anyone visits: settings, factors, and stages in order."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Final, Literal, Self, TypeVar, get_args
+from itertools import product
+from typing import Annotated, Any, Final, Literal, Self, get_args
 
-from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from galley.files import FileModel, Loc, faults
 from galley.names import name_fix
-from galley.study.items import Text
+from galley.study.factors import FACTOR_MARK, Factor, FactorName, Order, levels_of, resolve
+from galley.study.languages import LanguageCode, Text, Words
+from galley.study.recruitment import Attention, Completion, Endings, Recruitment, unknown_places
+from galley.study.stages import (
+    ALONE,
+    Comparison,
+    Consent,
+    Debrief,
+    InputMode,
+    Lobby,
+    Questions,
+    Quiz,
+    Rounds,
+    Stage,
+    TickMs,
+    Ticks,
+    Tutorial,
+    conditions_of,
+    names_differ,
+    stage_ids,
+)
 
 Hat = Literal["orange", "sky-blue", "bluish-green", "yellow", "blue", "vermillion", "reddish-purple"]
 HATS: Final[tuple[Hat, ...]] = get_args(Hat)
 """Colours that colour-blind people can tell apart. Source: Okabe and Ito, Color Universal Design (2008)."""
 
-S = TypeVar("S", bound=str)
+MOST_CELLS: Final = 1000
+ALONE_AGENT: Final = "stay"
+"""The agent in the other seat of a tutorial alone; it is not drawn."""
 
-DEFAULT_GOAL_TEXT = "Reach {goal} points together to meet this kitchen's goal."
-
-StageId = Annotated[str, Field(pattern=r"^[a-z][a-z0-9-]*$", max_length=40)]
-Ticks = Annotated[int, Field(ge=1, le=32_000)]
-
-
-def _known(what: str, kind: str) -> AfterValidator:
-    """Refuses a name that the workspace, given as validation context {kind: names}, does not hold."""
-
-    def check(name: str, info: ValidationInfo) -> str:
-        known: Mapping[str, tuple[str, ...]] = info.context or {}
-        if kind in known and name not in known[kind]:
-            raise faults([((), f"no {what} is named '{name}'", name_fix(name, known[kind]))])
-        return name
-
-    return AfterValidator(check)
-
-
-LayoutName = Annotated[str, _known("layout", "layouts")]
-AgentName = Annotated[str, _known("agent", "agents")]
-QuestionnaireName = Annotated[str, _known("questionnaire", "questionnaires")]
-TextName = Annotated[str, _known("text", "texts")]
-
-
-class _Stage(FileModel):
-    id: StageId | None = None
-    title: str = ""
-
-
-class Consent(_Stage):
-    """What the participant agrees to before anything else happens; they may decline."""
-
-    kind: Literal["consent"]
-    text: TextName
-
-
-class Questions(_Stage):
-    """A questionnaire that does not concern one round."""
-
-    kind: Literal["questionnaire"]
-    questionnaire: QuestionnaireName
-
-
-class Instructions(_Stage):
-    """A text to read."""
-
-    kind: Literal["instructions"]
-    text: TextName
-
-
-class Tutorial(_Stage):
-    """A round for getting used to the kitchen, whose score does not count."""
-
-    kind: Literal["tutorial"]
-    layout: LayoutName
-    agent: AgentName
-    seat: Literal["random", 0, 1] = "random"
-    horizon_ticks: Ticks | None = None
-    skippable: bool = False
-
-
-class Kitchen(FileModel):
-    """One layout of a rounds stage, and the score to aim for there."""
-
-    layout: LayoutName
-    goal: int | None = Field(None, ge=1, le=100_000)
-
-
-class Rounds(_Stage):
-    """Every agent on every layout, one round each, with a questionnaire after each.
-
-    Layouts come in the order written. On each layout the agents' order is drawn for each visit, or is as
-    written with `agent_order: fixed`. The participant's seat is drawn once a layout (`per_layout`: both
-    agents are met from the same place), for each round (`per_round`), or given.
-    """
-
-    kind: Literal["rounds"]
-    agents: tuple[AgentName, ...] = Field(min_length=1)
-    layouts: tuple[Kitchen, ...] = Field(min_length=1)
-    agent_order: Literal["random", "fixed"] = "random"
-    seats: Literal["per_layout", "per_round", 0, 1] = "per_layout"
-    after_each: QuestionnaireName | None = None
-    goal_text: str = DEFAULT_GOAL_TEXT
-
-    @field_validator("agents")
-    @classmethod
-    def _agents_differ(cls, agents: tuple[str, ...]) -> tuple[str, ...]:
-        return _differ(agents, "agent")
-
-    @field_validator("goal_text")
-    @classmethod
-    def _goal_text_has_only_the_goal(cls, text: str) -> str:
-        unknown = [name for name in re.findall(r"\{(.*?)\}", text) if name != "goal"]
-        if unknown:
-            raise faults([((), f"'{{{unknown[0]}}}' is unknown in the goal's text", "use {goal}")])
-        return text
-
-
-class Comparison(_Stage):
-    """A questionnaire that compares two partners by hat colour; which is first is drawn for each visit."""
-
-    kind: Literal["comparison"]
-    questionnaire: QuestionnaireName
-    agents: tuple[AgentName, AgentName] | None = None
-
-
-class Debrief(_Stage):
-    """The end: a text and the completion code."""
-
-    kind: Literal["debrief"]
-    text: TextName
-
-
-Stage = Annotated[
-    Consent | Questions | Instructions | Tutorial | Rounds | Comparison | Debrief, Field(discriminator="kind")
-]
-
-
-class Completion(FileModel):
-    """What a participant who reached the end takes away: a code, and perhaps an address to go to."""
-
-    code: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=64)]
-    redirect: Annotated[str, Field(pattern=r"^https://\S+$", max_length=500)] | None = None
+Fault = tuple[Loc, str, str]
+Named = tuple[str, str, Loc]
+"""(kind of thing in the workspace, name, place in the file)."""
 
 
 class StudyFile(FileModel):
@@ -148,21 +50,45 @@ class StudyFile(FileModel):
 
     format: Literal[1]
     title: Text
-    about: str = ""
+    about: Words = ""
+    languages: tuple[LanguageCode, ...] = Field(("en",), min_length=1, max_length=20)
     seed: int = Field(ge=0, lt=2**63)
     minutes: int | None = Field(None, ge=1, le=600)
-    tick_ms: int = Field(150, ge=20, le=2000)
+    tick_ms: TickMs = 150
     horizon_ticks: Ticks = 400
+    input_mode: InputMode = "hold"
     countdown_s: Annotated[int, Field(ge=0, le=30)] = 3
     abandon_after_s: Annotated[int, Field(ge=1, le=3600)] = 60
+    visit_limit_min: int | None = Field(None, ge=1, le=10_000)
     hats: tuple[Hat, ...] = HATS
+    hat_order: Order = "random"
+    bonus_unit: Annotated[str, Field(max_length=20)] = ""
+    factors: dict[FactorName, Factor] = Field(default_factory=dict)
+    quota: int | None = Field(None, ge=1, le=100_000)
+    slot_expires_min: int = Field(60, ge=1, le=100_000)
+    attention: Attention = Attention()
+    recruitment: Recruitment = Recruitment()
     completion: Completion
+    endings: Endings = Endings()
     stages: tuple[Stage, ...] = Field(min_length=2)
 
     @field_validator("hats")
     @classmethod
     def _hats_differ(cls, hats: tuple[Hat, ...]) -> tuple[Hat, ...]:
-        return _differ(hats, "hat")
+        return names_differ(hats, "hat")
+
+    @field_validator("languages")
+    @classmethod
+    def _languages_differ(cls, languages: tuple[str, ...]) -> tuple[str, ...]:
+        return names_differ(languages, "language")
+
+    @field_validator("factors")
+    @classmethod
+    def _factors_can_be_crossed(cls, factors: dict[str, Factor]) -> dict[str, Factor]:
+        found = list(_factor_faults(factors))
+        if found:
+            raise faults(found)
+        return factors
 
     @field_validator("stages")
     @classmethod
@@ -173,38 +99,144 @@ class StudyFile(FileModel):
         return stages
 
     @model_validator(mode="after")
-    def _hats_suffice(self) -> Self:
-        wanted = 1 + len(played_agents(self.stages)) + any(isinstance(s, Tutorial) for s in self.stages)
-        if len(self.hats) < wanted:
-            told = f"{len(self.hats)} hats for a participant, their partners and the tutorial's partner"
-            raise faults([(("hats",), told, f"name {wanted} or more of {' '.join(HATS)}")])
+    def _parts_fit_together(self, info: ValidationInfo) -> Self:
+        found = [*self._factor_name_faults(info.context or {}), *self._redirect_faults()]
+        if not found:
+            found = [*self._partner_faults(), *self._hat_faults()]
+        if found:
+            raise faults(found)
         return self
 
+    def conditions(self) -> tuple[dict[str, str], ...]:
+        """Every combination of the factors' levels."""
+        levels = [factor.levels for factor in self.factors.values()]
+        return tuple(dict(zip(self.factors, chosen, strict=True)) for chosen in product(*levels))
 
-def played_agents(stages: tuple[Stage, ...]) -> tuple[str, ...]:
-    """The agents of all rounds stages, each once, in the order they are first named."""
-    return tuple(dict.fromkeys(a for stage in stages if isinstance(stage, Rounds) for a in stage.agents))
+    def _factor_name_faults(self, known: Mapping[str, tuple[str, ...]]) -> Iterator[Fault]:
+        for kind, name, loc in named_in(self.stages):
+            factor = name.removeprefix(FACTOR_MARK)
+            if factor == name:
+                continue
+            if factor not in self.factors:
+                yield loc, f"no factor is named '{factor}'", name_fix(factor, self.factors)
+                continue
+            for n, level in enumerate(self.factors[factor].levels):
+                if kind in known and level not in known[kind]:
+                    told = f"level '{level}' stands for one of {kind}, and none has that name"
+                    yield ("factors", factor, "levels", n), told, name_fix(level, known[kind])
+        for place, stage in enumerate(self.stages):
+            for n, condition in enumerate(conditions_of(stage)):
+                if condition.factor is None:
+                    continue
+                loc = ("stages", place, "when", n)
+                if condition.factor not in self.factors:
+                    fix = name_fix(condition.factor, self.factors)
+                    yield (*loc, "factor"), f"no factor is named '{condition.factor}'", fix
+                    continue
+                levels = self.factors[condition.factor].levels
+                for key in ("any_of", "none_of"):
+                    for level in getattr(condition, key):
+                        if level not in levels:
+                            told = f"'{level}' is no level of '{condition.factor}'"
+                            yield (*loc, key), told, f"use one of {' '.join(levels)}"
+
+    def _redirect_faults(self) -> Iterator[Fault]:
+        endings = {("completion",): self.completion.redirect} | {
+            ("endings", name): getattr(self.endings, name).redirect for name in Endings.model_fields
+        }
+        for loc, redirect in endings.items():
+            for name in unknown_places(redirect, self.recruitment.keep):
+                told = f"'{{{name}}}' in the address is no parameter that is kept"
+                yield (*loc, "redirect"), told, name_fix(name, ("code", *self.recruitment.keep))
+
+    def _partner_faults(self) -> Iterator[Fault]:
+        """Partners who turn out to be the same one in some condition."""
+        for condition in self.conditions():
+            for place, stage in enumerate(self.stages):
+                if not isinstance(stage, (Rounds, Comparison)) or stage.agents is None:
+                    continue
+                agents = [resolve(agent, condition) for agent in stage.agents]
+                if len(set(agents)) < len(agents) and len(set(stage.agents)) == len(stage.agents):
+                    told = f"agent '{max(agents, key=agents.count)}' is met twice where {_told(condition)}"
+                    yield ("stages", place, "agents"), told, "remove it from the levels of the factor"
+                    return
+
+    def _hat_faults(self) -> Iterator[Fault]:
+        tutorials = any(isinstance(stage, Tutorial) for stage in self.stages)
+        wanted = 1 + max(len(played_agents(self.stages, c)) for c in self.conditions()) + tutorials
+        if len(self.hats) < wanted:
+            told = f"{len(self.hats)} hats for a participant, their partners and the tutorial's partner"
+            yield ("hats",), told, f"name {wanted} or more of {' '.join(HATS)}"
 
 
-def stage_ids(stages: tuple[Stage, ...]) -> tuple[str, ...]:
-    """Each stage's id: as written, else its kind, with a number from the second of a kind on."""
-    counted: dict[str, int] = {}
-    ids = []
-    for stage in stages:
-        counted[stage.kind] = counted.get(stage.kind, 0) + 1
-        number = counted[stage.kind]
-        ids.append(stage.id or (stage.kind if number == 1 else f"{stage.kind}-{number}"))
-    return tuple(ids)
+def played_agents(stages: tuple[Stage, ...], condition: Mapping[str, str]) -> tuple[str, ...]:
+    """The partners of all rounds stages in a condition, each once, in the order they are first named."""
+    named = (agent for stage in stages if isinstance(stage, Rounds) for agent in stage.agents)
+    return tuple(dict.fromkeys(resolve(agent, condition) for agent in named))
 
 
-def _differ(names: tuple[S, ...], what: str) -> tuple[S, ...]:
-    twice = [place for place, name in enumerate(names) if name in names[:place]]
-    if twice:
-        raise faults([((p,), f"{what} '{names[p]}' stands twice", "name each once") for p in twice])
-    return names
+def named_in(stages: tuple[Stage, ...]) -> Iterator[Named]:
+    """Everything that the stages name, in order; a name may be a `$factor`."""
+    for place, stage in enumerate(stages):
+        loc = ("stages", place)
+        text: str | None = getattr(stage, "text", None)
+        if text is not None:
+            yield "texts", text, (*loc, "text")
+        match stage:
+            case Questions() | Quiz() | Comparison():
+                yield "questionnaires", stage.questionnaire, (*loc, "questionnaire")
+            case Tutorial():
+                yield "layouts", stage.layout, (*loc, "layout")
+                agent = ALONE_AGENT if stage.agent == ALONE else stage.agent
+                yield "agents", agent, (*loc, "agent")
+            case Rounds():
+                for n, kitchen in enumerate(stage.layouts):
+                    yield "layouts", kitchen.layout, (*loc, "layouts", n, "layout")
+                for n, agent in enumerate(stage.agents):
+                    yield "agents", agent, (*loc, "agents", n)
+                for key, agent in (stage.lobby or Lobby()).agents:
+                    yield "agents", agent, (*loc, "lobby", key)
+                if stage.after_each is not None:
+                    yield "questionnaires", stage.after_each, (*loc, "after_each")
+            case _:
+                pass
 
 
-def _order_faults(stages: tuple[Stage, ...]) -> Iterator[tuple[Loc, str, str]]:
+def names_of(config: StudyFile, kind: str) -> tuple[str, ...]:
+    """All names of one kind that a visit to the study may need, each once, factors resolved."""
+    found = [
+        name
+        for what, written, _ in named_in(config.stages)
+        if what == kind
+        for name in levels_of(written, config.factors)
+    ]
+    if kind == "texts":
+        endings = (getattr(config.endings, name).text for name in Endings.model_fields)
+        found += [text for text in endings if text is not None]
+    return tuple(dict.fromkeys(found))
+
+
+def _told(condition: Mapping[str, Any]) -> str:
+    return ", ".join(f"{name} is {level}" for name, level in condition.items())
+
+
+def _factor_faults(factors: Mapping[str, Factor]) -> Iterator[Fault]:
+    full = [factor for factor in factors.values() if factor.assign == "full"]
+    count = 1
+    for factor in factors.values():
+        count *= len(factor.levels)
+    if count > MOST_CELLS:
+        yield (), f"the factors make {count} combinations", f"keep to {MOST_CELLS}"
+    for name, factor in factors.items():
+        if factor.assign == "latin_square" and (
+            len(full) < 2 or any(len(other.levels) != len(factor.levels) for other in full)
+        ):
+            told = f"factor '{name}' cannot form a Latin square with the full factors"
+            fix = f"cross two or more full factors of {len(factor.levels)} levels each, or use `assign: full`"
+            yield (name, "assign"), told, fix
+
+
+def _order_faults(stages: tuple[Stage, ...]) -> Iterator[Fault]:
     if not isinstance(stages[0], Consent):
         yield (0,), "the first stage is not consent", "start with `- {kind: consent, text: ...}`"
     if not isinstance(stages[-1], Debrief):
@@ -217,18 +249,18 @@ def _order_faults(stages: tuple[Stage, ...]) -> Iterator[tuple[Loc, str, str]]:
             yield (place,), "a stage comes after debrief", "make debrief the last and only one"
 
 
-def _id_faults(stages: tuple[Stage, ...]) -> Iterator[tuple[Loc, str, str]]:
+def _id_faults(stages: tuple[Stage, ...]) -> Iterator[Fault]:
     ids = stage_ids(stages)
     for place, stage_id in enumerate(ids):
         if stage_id in ids[:place]:
             yield (place, "id"), f"stage id '{stage_id}' stands twice", "give each stage its own id"
 
 
-def _comparison_faults(stages: tuple[Stage, ...]) -> Iterator[tuple[Loc, str, str]]:
+def _comparison_faults(stages: tuple[Stage, ...]) -> Iterator[Fault]:
     for place, stage in enumerate(stages):
         if not isinstance(stage, Comparison):
             continue
-        met = played_agents(stages[:place])
+        met = played_as_written(stages[:place])
         if stage.agents is None:
             if len(met) != 2:
                 told = f"the rounds before this comparison have {len(met)} agents, not two"
@@ -240,3 +272,8 @@ def _comparison_faults(stages: tuple[Stage, ...]) -> Iterator[tuple[Loc, str, st
                 yield (place, "agents", n), f"agent '{agent}' is not met before", name_fix(agent, met)
         if stage.agents[0] == stage.agents[1]:
             yield (place, "agents"), "an agent is compared with itself", "name two agents"
+
+
+def played_as_written(stages: tuple[Stage, ...]) -> tuple[str, ...]:
+    """The partners of all rounds stages as the file writes them, each once."""
+    return tuple(dict.fromkeys(a for stage in stages if isinstance(stage, Rounds) for a in stage.agents))

@@ -7,11 +7,11 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from galley.files import FileModel, Loc, faults
+from galley.study.languages import Text, Words
 
 RESERVED_IDS = ("step",)
 """Names of form fields that the pages need themselves."""
 
-Text = Annotated[str, Field(min_length=1, max_length=2000)]
 ItemId = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=40)]
 
 
@@ -32,16 +32,18 @@ class Option(FileModel):
 class _Item(FileModel):
     id: ItemId
     text: Text
-    help: str = ""
+    help: Words = ""
     required: bool = True
     when: When | None = None
+    hint: Words = ""
+    subscale: Annotated[str, Field(pattern=r"^[a-z0-9_-]*$", max_length=40)] = ""
 
 
 class _Scale(_Item):
-    scale: int = Field(7, ge=2, le=11)
+    scale: int = Field(7, ge=2, le=101)
     low_label: Text
     high_label: Text
-    labels: tuple[str, ...] = ()
+    labels: tuple[Words, ...] = ()
 
     @model_validator(mode="after")
     def _one_label_per_point(self) -> Self:
@@ -51,11 +53,8 @@ class _Scale(_Item):
         return self
 
 
-class Likert(_Scale):
-    """Agreement with a statement, from 1 (low_label) to `scale` (high_label); `expected` makes it a check."""
-
-    kind: Literal["likert"]
-    style: Literal["radio", "stars"] = "radio"
+class _Rating(_Scale):
+    reversed: bool = False
     expected: int | None = None
 
     @model_validator(mode="after")
@@ -65,6 +64,19 @@ class Likert(_Scale):
         return self
 
 
+class Likert(_Rating):
+    """Agreement with a statement, from 1 (low_label) to `scale` (high_label); `expected` makes it a check."""
+
+    kind: Literal["likert"]
+    style: Literal["radio", "stars"] = "radio"
+
+
+class SemanticDifferential(_Rating):
+    """A place between two opposite words, from 1 (low_label) to `scale` (high_label)."""
+
+    kind: Literal["semantic_differential"]
+
+
 class Comparison(_Scale):
     """Preference between two partners, from 1 (strongly the first) to `scale` (strongly the second)."""
 
@@ -72,7 +84,7 @@ class Comparison(_Scale):
 
 
 class _Choice(_Item):
-    options: tuple[Option, ...] = Field(min_length=2)
+    options: tuple[Option, ...] = Field(min_length=2, max_length=50)
 
     @model_validator(mode="after")
     def _values_differ(self) -> Self:
@@ -86,6 +98,13 @@ class _Choice(_Item):
             raise faults(twice)
         return self
 
+    def _must_be_options(self, expected: tuple[str, ...]) -> None:
+        values = [option.value for option in self.options]
+        wrong = [value for value in expected if value not in values]
+        if wrong:
+            fix = f"use one of {' '.join(values)}"
+            raise faults([(("expected",), f"'{value}' is no option", fix) for value in wrong])
+
 
 class SingleChoice(_Choice):
     """Exactly one of several options; `expected` makes it an attention check."""
@@ -95,33 +114,71 @@ class SingleChoice(_Choice):
 
     @model_validator(mode="after")
     def _expected_is_an_option(self) -> Self:
-        values = [option.value for option in self.options]
-        if self.expected is not None and self.expected not in values:
-            fix = f"use one of {' '.join(values)}"
-            raise faults([(("expected",), f"'{self.expected}' is no option", fix)])
+        self._must_be_options(() if self.expected is None else (self.expected,))
         return self
 
 
 class MultipleChoice(_Choice):
-    """Any number of several options; at least one if the item is required."""
+    """Any number of several options, at least one if required; `expected` are exactly those to choose."""
 
     kind: Literal["multiple_choice"]
+    expected: tuple[str, ...] | None = Field(None, min_length=1)
+
+    @model_validator(mode="after")
+    def _expected_are_options(self) -> Self:
+        self._must_be_options(self.expected or ())
+        return self
 
 
-class Number(_Item):
-    """A number between `min` and `max`, both allowed; a whole one unless `whole: false`."""
+class Ranking(_Choice):
+    """All options in an order, the best first; every one gets a place."""
 
-    kind: Literal["number"]
+    kind: Literal["ranking"]
+    options: tuple[Option, ...] = Field(min_length=2, max_length=20)
+
+
+class _Amount(_Item):
     min: float
     max: float
-    whole: bool = True
-    unit: str = ""
+    unit: Words = ""
+    expected: float | None = None
 
     @model_validator(mode="after")
     def _range_is_not_empty(self) -> Self:
         if self.min > self.max:
             told = f"'min' {self.min:g} is above 'max' {self.max:g}"
             raise faults([(("min",), told, "exchange them")])
+        if self.expected is not None and not self.min <= self.expected <= self.max:
+            told = f"{self.expected:g} is out of range"
+            raise faults([(("expected",), told, f"use {self.min:g} to {self.max:g}")])
+        return self
+
+
+class Number(_Amount):
+    """A number between `min` and `max`, both allowed; a whole one unless `whole: false`."""
+
+    kind: Literal["number"]
+    whole: bool = True
+
+
+class Slider(_Amount):
+    """A place on a line from `min` to `max` in steps of `step`; no answer until it is touched."""
+
+    kind: Literal["slider"]
+    min: float = 0
+    max: float = 100
+    step: float = Field(1, gt=0)
+    low_label: Text
+    high_label: Text
+    show_value: bool = False
+    reversed: bool = False
+
+    @model_validator(mode="after")
+    def _steps_fill_the_line(self) -> Self:
+        steps = (self.max - self.min) / self.step
+        if steps < 1 or abs(steps - round(steps)) > 1e-9:
+            told = f"steps of {self.step:g} do not lead from {self.min:g} to {self.max:g}"
+            raise faults([(("step",), told, "choose a step that divides the line")])
         return self
 
 
@@ -140,7 +197,16 @@ class LongText(_Item):
 
 
 Item = Annotated[
-    Likert | Comparison | SingleChoice | MultipleChoice | Number | ShortText | LongText,
+    Likert
+    | SemanticDifferential
+    | Comparison
+    | SingleChoice
+    | MultipleChoice
+    | Ranking
+    | Number
+    | Slider
+    | ShortText
+    | LongText,
     Field(discriminator="kind"),
 ]
 
@@ -173,5 +239,8 @@ def item_faults(items: tuple[Any, ...]) -> list[tuple[Loc, str, str]]:
                 ]
         if isinstance(item, (SingleChoice, MultipleChoice)):
             choices[item.id] = [option.value for option in item.options]
+        if getattr(item, "expected", None) is not None and not item.required:
+            told = f"item '{item.id}' has an expected answer but need not be answered"
+            found.append(((place, "required"), told, "remove `required: false`, or the expected answer"))
         seen.add(item.id)
     return found

@@ -1,0 +1,283 @@
+"""The stages of a study, as its file describes them."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Any, Final, Literal, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from galley.files import FileModel, Loc, faults
+from galley.study.factors import (
+    Conditions,
+    LayoutName,
+    Order,
+    PartnerName,
+    QuestionnaireName,
+    TextName,
+    known_name,
+)
+from galley.study.languages import Words
+
+HUMAN: Final = "human"
+"""Named as an agent: another participant."""
+
+ALONE: Final = "none"
+"""Named as a tutorial's agent: nobody is seen."""
+
+StageId = Annotated[str, Field(pattern=r"^[a-z][a-z0-9-]*$", max_length=40)]
+Ticks = Annotated[int, Field(ge=1, le=32_000)]
+TickMs = Annotated[int, Field(ge=20, le=2000)]
+Seconds = Annotated[int, Field(ge=1, le=7200)]
+InputMode = Literal["hold", "press"]
+
+
+class _Named(FileModel):
+    id: StageId | None = None
+    title: Words = ""
+
+
+class _Stage(_Named):
+    when: Conditions = ()
+
+
+class _Page(_Stage):
+    skippable: bool = False
+    time_limit_s: Seconds | None = None
+    at_limit: Literal["go_on", "end"] = "go_on"
+    at_least_s: int = Field(0, ge=0, le=3600)
+
+    @model_validator(mode="after")
+    def _can_be_left_in_time(self) -> Self:
+        if self.time_limit_s is not None and self.at_least_s >= self.time_limit_s:
+            told = f"nobody may go on before {self.at_least_s} s, but the time limit is {self.time_limit_s} s"
+            raise faults([(("at_least_s",), told, "make it shorter than the limit")])
+        return self
+
+
+class Consent(_Named):
+    """What the participant agrees to before anything else happens; they may decline."""
+
+    kind: Literal["consent"]
+    text: TextName
+
+
+class Questions(_Page):
+    """A questionnaire that does not concern one round."""
+
+    kind: Literal["questionnaire"]
+    questionnaire: QuestionnaireName
+
+
+class Instructions(_Page):
+    """A text to read."""
+
+    kind: Literal["instructions"]
+    text: TextName
+
+
+class Quiz(_Page):
+    """Questions with one right answer each, asked again until all are right or the tries are used up."""
+
+    kind: Literal["quiz"]
+    questionnaire: QuestionnaireName
+    tries: int = Field(3, ge=1, le=100)
+    after_last: Literal["end", "go_on"] = "end"
+    text: TextName | None = None
+    skippable: Literal[False] = False
+
+
+class Break(_Page):
+    """A rest; it lasts until the participant goes on, or until its time limit."""
+
+    kind: Literal["break"]
+    text: TextName | None = None
+
+
+class ScreenOut(_Stage):
+    """Ends the visit of those who meet its condition."""
+
+    kind: Literal["screen_out"]
+    when: Conditions = Field(min_length=1)
+
+
+class Tutorial(_Stage):
+    """A round for getting used to the kitchen, whose score does not count; with agent `none` it is alone."""
+
+    kind: Literal["tutorial"]
+    layout: LayoutName
+    agent: Annotated[str, known_name("agent", "agents", ALONE)]
+    seat: Literal["random", 0, 1] = "random"
+    horizon_ticks: Ticks | None = None
+    tick_ms: TickMs | None = None
+    episodes: int = Field(1, ge=1, le=50)
+    input_mode: InputMode | None = None
+    show_score: Literal["during", "after", "never"] = "during"
+    skippable: bool = False
+
+    @model_validator(mode="after")
+    def _alone_on_a_known_seat(self) -> Self:
+        if self.agent == ALONE and self.seat == "random":
+            fix = "add `seat: 0` or `seat: 1`, the start that is not walled off"
+            raise faults([(("agent",), "a tutorial alone needs a seat", fix)])
+        return self
+
+
+class Kitchen(FileModel):
+    """One layout of a rounds stage, the score to aim for there, and what differs from the other rounds."""
+
+    layout: LayoutName
+    goal: int | None = Field(None, ge=1, le=100_000)
+    bonus: float | None = Field(None, gt=0, le=100_000)
+    horizon_ticks: Ticks | None = None
+    tick_ms: TickMs | None = None
+
+    @model_validator(mode="after")
+    def _a_bonus_needs_a_goal(self) -> Self:
+        if self.bonus is not None and self.goal is None:
+            raise faults([(("bonus",), "a bonus without a goal cannot be earned", "add `goal: ...`")])
+        return self
+
+
+class Lobby(FileModel):
+    """How participants of `human` rounds find each other, and what happens when one is not there.
+
+    `fallback` after `wait_s`: `exit` ends the visit as partner_missing, `go_on` leaves the round out, an
+    agent's name plays instead. `dropout` when the other one leaves: `end_round`, or an agent who takes over.
+    """
+
+    wait_s: Seconds = 120
+    fallback: Annotated[str, known_name("agent", "agents", "exit", "go_on")] = "exit"
+    dropout: Annotated[str, known_name("agent", "agents", "end_round")] = "end_round"
+
+    @property
+    def agents(self) -> tuple[tuple[str, str], ...]:
+        """(key, agent) of those that may step in."""
+        named = (("fallback", self.fallback), ("dropout", self.dropout))
+        return tuple((key, name) for key, name in named if name not in ("exit", "go_on", "end_round"))
+
+
+class Rounds(_Stage):
+    """Every agent on every layout, one round each, with a questionnaire after each.
+
+    Rounds come in blocks: all agents on one layout, then the next layout (`blocks: layout`), or all layouts
+    with one agent, then the next agent (`blocks: agent`). An order is as written (`fixed`), drawn for each
+    visit (`random`), a row of a Latin square (`latin_square`), or one of all there are, each equally often
+    (`full`). What comes inside the blocks has an order of its own in every block. With `pairs` other than
+    `all` each layout is played once, with one of the agents. The participant's seat belongs to a layout
+    (`per_layout`: every agent is met from the same place), to a round (`per_round`), or is given.
+    """
+
+    kind: Literal["rounds"]
+    agents: tuple[PartnerName, ...] = Field(min_length=1, max_length=20)
+    layouts: tuple[Kitchen, ...] = Field(min_length=1, max_length=100)
+    blocks: Literal["layout", "agent"] = "layout"
+    pairs: Literal["all", "random", "fixed", "latin_square", "full"] = "all"
+    layout_order: Order = "fixed"
+    agent_order: Order = "random"
+    seats: Literal["per_layout", "per_round", 0, 1] = "per_layout"
+    seat_order: Order = "random"
+    horizon_ticks: Ticks | None = None
+    tick_ms: TickMs | None = None
+    episodes: int = Field(1, ge=1, le=50)
+    input_mode: InputMode | None = None
+    show_score: Literal["during", "after", "never"] = "during"
+    after_each: QuestionnaireName | None = None
+    goal_text: Words = ""
+    lobby: Lobby | None = None
+    skippable: bool = False
+
+    @property
+    def count(self) -> int:
+        """How many rounds a visit plays in this stage."""
+        return len(self.layouts) * (len(self.agents) if self.pairs == "all" else 1)
+
+    @field_validator("agents")
+    @classmethod
+    def _agents_differ(cls, agents: tuple[str, ...]) -> tuple[str, ...]:
+        return names_differ(agents, "agent")
+
+    @field_validator("goal_text")
+    @classmethod
+    def _goal_text_has_only_the_goal(cls, text: str) -> str:
+        unknown = [name for name in re.findall(r"\{(.*?)\}", text) if name not in ("goal", "bonus")]
+        if unknown:
+            raise faults([((), f"'{{{unknown[0]}}}' is unknown in the goal's text", "use {goal} or {bonus}")])
+        return text
+
+    @model_validator(mode="after")
+    def _keys_fit_together(self) -> Self:
+        found: list[tuple[Loc, str, str]] = []
+        if self.pairs != "all" and self.blocks == "agent":
+            told = "blocks of one agent need every agent on every layout"
+            found.append((("pairs",), told, "use `blocks: layout`, or `pairs: all`"))
+        if HUMAN in self.agents:
+            found += self._human_faults()
+        elif self.lobby is not None:
+            fix = "name `human` among the agents, or remove it"
+            found.append((("lobby",), "a lobby is for rounds with another participant", fix))
+        if found:
+            raise faults(found)
+        return self
+
+    def _human_faults(self) -> list[tuple[Loc, str, str]]:
+        """Two participants meet only if both come to the same round at the same time."""
+        found: list[tuple[Loc, str, str]] = []
+        orders = (
+            ("layout_order", self.layout_order, len(self.layouts)),
+            ("agent_order", self.agent_order, len(self.agents)),
+        )
+        for key, order, count in orders:
+            if order != "fixed" and count > 1:
+                told = f"participants who play with each other need the same order, not {key} '{order}'"
+                found.append(((key,), told, f"write `{key}: fixed`"))
+        if self.pairs not in ("all", "fixed"):
+            told = f"participants who play with each other need the same pairs, not '{self.pairs}'"
+            found.append((("pairs",), told, "write `pairs: fixed`, or `pairs: all`"))
+        return found
+
+
+class Comparison(_Page):
+    """A questionnaire that compares two partners by hat colour; which is first is drawn for each visit."""
+
+    kind: Literal["comparison"]
+    questionnaire: QuestionnaireName
+    agents: tuple[PartnerName, PartnerName] | None = None
+
+
+class Debrief(_Named):
+    """The end: a text and the completion code."""
+
+    kind: Literal["debrief"]
+    text: TextName
+
+
+Stage = Annotated[
+    Consent | Questions | Instructions | Quiz | Break | ScreenOut | Tutorial | Rounds | Comparison | Debrief,
+    Field(discriminator="kind"),
+]
+
+
+def conditions_of(stage: Any) -> Conditions:
+    """The conditions of a stage; consent and debrief have none."""
+    return getattr(stage, "when", ())
+
+
+def stage_ids(stages: tuple[Stage, ...]) -> tuple[str, ...]:
+    """Each stage's id: as written, else its kind, with a number from the second of a kind on."""
+    counted: dict[str, int] = {}
+    ids = []
+    for stage in stages:
+        counted[stage.kind] = counted.get(stage.kind, 0) + 1
+        number = counted[stage.kind]
+        name = stage.kind.replace("_", "-")
+        ids.append(stage.id or (name if number == 1 else f"{name}-{number}"))
+    return tuple(ids)
+
+
+def names_differ(names: tuple[Any, ...], what: str) -> tuple[Any, ...]:
+    """The names, each of which has to stand once."""
+    twice = [place for place, name in enumerate(names) if name in names[:place]]
+    if twice:
+        raise faults([((p,), f"{what} '{names[p]}' stands twice", "name each once") for p in twice])
+    return names
