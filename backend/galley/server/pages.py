@@ -13,6 +13,7 @@ from galley.records import Store
 from galley.server.forms import FormError, read_form
 from galley.server.matches import Matches
 from galley.server.origin import same_origin
+from galley.server.templates import templates as templates
 from galley.server.visits import Visit, Visits
 from galley.study.plan import Step
 from galley.study.progress import Agreed, Continued, Declined, Happening, Submitted
@@ -199,17 +200,6 @@ class Pages:
     def _page(self, template: str, status_code: int = 200, /, **values: Any) -> Response:
         html = self._templates.get_template(template).render(**values)
         return HTMLResponse(html, status_code, NEVER_CACHED)
-
-
-def templates(folder: str) -> jinja2.Environment:
-    """The templates of a folder; everything put into them is escaped unless it is marked as HTML."""
-    return jinja2.Environment(
-        loader=jinja2.FileSystemLoader(folder),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
 
 
 def _public_study(study: Study) -> dict[str, Any]:
