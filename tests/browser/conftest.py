@@ -18,9 +18,12 @@ from tests.browser.site import ROOT, SECRET_NAMES, Site
 from tests.browser.watching import Watcher
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    """The system's Chromium; `make test` installs one where there is none."""
+    """The system's Chromium; `make test` installs one where there is none.
+
+    It goes with its module: as long as it is there an event loop is, and no other test may run its own.
+    """
     found = subprocess.run(["sh", ROOT / "tests/chromium.sh"], capture_output=True, text=True, check=False)
     if found.returncode:
         pytest.fail(found.stderr)

@@ -11,6 +11,7 @@ from tests.browser.cook import Cook
 from tests.browser.watching import Watcher
 
 MAX_TABS = 200
+SETTLE_MS = 400  # cards fade in; a picture waits for them
 FOCUSED = "element => element === document.activeElement"
 BUTTON = "[data-part=card-button]"
 
@@ -34,9 +35,11 @@ class Participant:
         """Which kind of page this is."""
         return self.page.locator("body").get_attribute("data-stage") or ""
 
-    def shoot(self, name: str) -> None:
+    def shoot(self, name: str, settle: bool = True) -> None:
         """Keep a picture of the page, numbered in the order of the visit, and search the page for secrets."""
         self._shown += 1
+        if settle:
+            self.page.wait_for_timeout(SETTLE_MS)
         self.page.screenshot(path=self.folder / f"{self._shown:02}-{name}.png", full_page=True)
         self.watcher.read(self.page)
 
@@ -125,7 +128,7 @@ class Participant:
         self.cook_until(cook, 1)
         self.press("Space")
         self.cook_until(cook, cook.horizon // 2)
-        self.shoot("round-middle")
+        self.shoot("round-middle", settle=False)
         self.cook_until(cook, cook.horizon)
         self.finish()
 

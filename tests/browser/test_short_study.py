@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.browser.participant import Participant
+from tests.browser.participant import SETTLE_MS, Participant
 from tests.browser.site import ROOT, Site, check_answered, check_played, newest_visit, open_site
 
 TICKS = 40
@@ -54,7 +54,9 @@ def test_a_reload_comes_back_to_the_same_round_and_a_second_tab_is_told(
     participant.shoot("back-after-reload")
     again = participant.watcher.last("keyframe")
     assert again is not None
-    assert again["tick"] >= 10
+    assert again["tick"] >= 10, [
+        (frame["type"], frame.get("phase"), frame.get("tick")) for frame in participant.watcher.received
+    ]
     participant.cook_until(participant.start(), 20)
 
     old = participant.page
@@ -62,8 +64,11 @@ def test_a_reload_comes_back_to_the_same_round_and_a_second_tab_is_told(
     participant.page.goto(old.url)
     participant.page.locator("#kitchen.drawn").wait_for()
     old.get_by_text("open in another tab").wait_for()
+    old.bring_to_front()
+    old.wait_for_timeout(SETTLE_MS)
     old.screenshot(path=participant.folder / "second-tab.png")
     old.keyboard.press("ArrowUp")
+    participant.page.bring_to_front()
     cook = participant.start()
     participant.cook_until(cook, TICKS)
     participant.finish()
