@@ -384,6 +384,7 @@ def test_a_killed_server_loses_at_most_a_second_and_the_round_goes_on(tmp_path: 
             assert last - frame["tick"] <= 60, "50 ticks a second, and the commit takes its time"
             player.send("ready")
             assert player.until("ended")["outcome"] == "finished"
+    assert server.process.returncode == 0, "told to stop, it stops cleanly"
     with Store.open(database) as store:
         visit = store.visit(someone.token).result()
         assert visit is not None
