@@ -30,12 +30,20 @@ def _learn() -> None:
 @app.command()
 def bc(
     data: Annotated[
-        Path, typer.Option(metavar="PATH", help="Pickle of human games, or the folder that holds both.")
-    ],
+        Path | None,
+        typer.Option(
+            metavar="PATH",
+            help="Pickle of human games, or the folder that holds both.",
+            show_default=".cache/overcooked-ai in the workspace",
+        ),
+    ] = None,
     split: Annotated[
         Split, typer.Option(metavar="SPLIT", help="train makes human-bc, test makes human-proxy.")
     ] = Split.train,
-    seed: Annotated[int, typer.Option(help="Seed of the training.")] = 0,
+    seed: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="Seed of the training.", show_default="that of the bundles here"),
+    ] = None,
     games: Annotated[int, typer.Option(min=1, help="Games that measure the result.")] = 100,
     out: Annotated[
         Path | None,
@@ -48,5 +56,7 @@ def bc(
     if missing:
         raise GalleyError(f"galley learn needs {', '.join(missing)}; install: pip install 'galley[learn]'")
     from galley.learning.bc import learn_bc
+    from galley.learning.card import SEED
 
+    seed = SEED if seed is None else seed
     learn_bc(workspace, data=data, split=split.value, seed=seed, games=games, out=out, tell=typer.echo)
