@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from galley import __version__
-from galley.commands import agents, check, export, init, learn, serve, trajectories
+from galley.commands import agents, check, evaluate, export, init, learn, serve, trajectories
 from galley.errors import GalleyError
 
 app = typer.Typer(
@@ -22,6 +22,7 @@ app.command()(serve.serve)
 app.command()(check.check)
 app.command()(init.init)
 app.command()(export.export)
+app.command()(evaluate.evaluate)
 app.add_typer(trajectories.app, name="trajectories")
 app.add_typer(agents.app, name="agents")
 app.add_typer(learn.app, name="learn")

@@ -16,13 +16,21 @@ app = typer.Typer(help="Recorded games: import, verify, measure.", no_args_is_he
 
 @app.command("import")
 def import_files(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Pickles of human games.")],
+    files: Annotated[
+        list[Path], typer.Argument(metavar="FILE...", help="Pickles of human games, or .csv of the LSI user study.")
+    ],
     json_: JsonOption = False,
 ) -> None:
-    """Replay the human games of the overcooked-ai package and compare every transition."""
+    """Replay recorded human games and compare: every transition of pickles, the recorded figures of .csv files."""
+    studies = [file for file in files if file.suffix.lower() == ".csv"]
+    pickles = [file for file in files if file not in studies]
+    if studies:
+        _import_study(studies, json_)
+    if not pickles:
+        return
     from galley.kitchen.human_data import import_files as read
 
-    report = read(files)
+    report = read(pickles)
     figures = {
         "games": report.games,
         "transitions": report.transitions,
@@ -31,6 +39,25 @@ def import_files(
     }
     typer.echo(json.dumps(figures) if json_ else " ".join(f"{key}={value}" for key, value in figures.items()))
     if report.mismatched:
+        raise typer.Exit(1)
+
+
+def _import_study(files: list[Path], json_: bool) -> None:
+    from galley.kitchen.lsi_study import import_study
+
+    games = import_study(files)
+    different = 0
+    for game in games:
+        told = game.differences()
+        different += bool(told)
+        row = {"game": game.place, "layout": game.name, **asdict(game.recomputed()), "differences": told}
+        if json_:
+            typer.echo(json.dumps(row))
+        else:
+            typer.echo(f"{game.place} {game.name}: {'; '.join(told) or 'as recorded'}")
+    figures = {"games": len(games), "equal": len(games) - different, "different": different}
+    typer.echo(json.dumps(figures) if json_ else " ".join(f"{key}={value}" for key, value in figures.items()))
+    if different:
         raise typer.Exit(1)
 
 

@@ -14,7 +14,7 @@ from galley.kitchen.rules import step
 from galley.planning.brain import brain
 from galley.planning.team_kernel import LEG_TICKS, Search, search_plan
 
-ORDERS_AHEAD = 2
+ORDERS_AHEAD = 3
 """Orders planned for at a time when there is no order list."""
 WIDTH = 24
 """Nodes kept per tick in the search for a plan from the start or after one has been carried out."""

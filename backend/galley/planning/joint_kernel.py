@@ -11,11 +11,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy import int16, int32
 from numpy.typing import NDArray
 
 from galley.kitchen.codes import STAY
+from galley.planning.compiling import kernel
 
 FAR = 32000
 """The cost of what cannot be reached."""
@@ -43,7 +43,7 @@ class JointTables(NamedTuple):
     queue: NDArray[int32]  # [(F + 4)^2], space to work in
 
 
-@njit(cache=True)
+@kernel
 def _before(
     joint: JointTables, poses: NDArray[int16], state: int, bumps: bool, found: NDArray[int16]
 ) -> int:
@@ -78,7 +78,7 @@ def _before(
     return count
 
 
-@njit(cache=True)
+@kernel
 def _faces_floor(joint: JointTables, poses: NDArray[int16], count: int) -> bool:
     for index in range(count):
         if joint.ahead[poses[index] // 4, poses[index] % 4] >= 0:
@@ -86,7 +86,7 @@ def _faces_floor(joint: JointTables, poses: NDArray[int16], count: int) -> bool:
     return False
 
 
-@njit(cache=True)
+@kernel
 def _fill(joint: JointTables, goal0: int, goal1: int, table: NDArray[int16]) -> None:
     """Nothing; `table` int16[F + 4, F + 4] becomes the fewest ticks until both goals hold at once."""
     floors = joint.cell_of.size
@@ -156,7 +156,7 @@ def _fill(joint: JointTables, goal0: int, goal1: int, table: NDArray[int16]) -> 
                     last += 1
 
 
-@njit(cache=True)
+@kernel
 def table_of(joint: JointTables, goal0: int, goal1: int) -> int:
     """The slot of the table for a pair of goals, filled now if need be; the oldest gives way when all are used."""
     slot = joint.slot[goal0, goal1]
@@ -176,7 +176,7 @@ def table_of(joint: JointTables, goal0: int, goal1: int) -> int:
     return int(slot)
 
 
-@njit(cache=True)
+@kernel
 def _settled(joint: JointTables, goal: int, pose: int) -> int:
     """The state of a chef that has settled at `pose`, or that of its cell if that pose does not end its goal."""
     for index in range(MOST_POSES):
@@ -185,7 +185,7 @@ def _settled(joint: JointTables, goal: int, pose: int) -> int:
     return pose // 4
 
 
-@njit(cache=True)
+@kernel
 def _cost(joint: JointTables, slot: int, goal0: int, goal1: int, pose0: int, pose1: int) -> int:
     """`joint_cost` from the table in a slot."""
     table = joint.tables[slot]
@@ -204,7 +204,7 @@ def _cost(joint: JointTables, slot: int, goal0: int, goal1: int, pose0: int, pos
     return int(best)
 
 
-@njit(cache=True)
+@kernel
 def joint_cost(joint: JointTables, goal0: int, goal1: int, pose0: int, pose1: int) -> int:
     """The fewest ticks from poses (4 * floor + facing) until both goals hold at once; FAR if never."""
     if goal0 == FREE and goal1 == FREE:
@@ -212,7 +212,7 @@ def joint_cost(joint: JointTables, goal0: int, goal1: int, pose0: int, pose1: in
     return _cost(joint, table_of(joint, goal0, goal1), goal0, goal1, pose0, pose1)
 
 
-@njit(cache=True)
+@kernel
 def moved(joint: JointTables, pose0: int, pose1: int, act0: int, act1: int) -> tuple[int, int]:
     """The poses after one tick in which the chefs move or stay, as `galley.kitchen.rules` has it."""
     at0 = pose0 // 4
@@ -231,7 +231,7 @@ def moved(joint: JointTables, pose0: int, pose1: int, act0: int, act1: int) -> t
     return 4 * to0 + facing0, 4 * to1 + facing1
 
 
-@njit(cache=True)
+@kernel
 def _alone(joint: JointTables, costs: NDArray[int16], goal: int, pose: int) -> int:
     """The fewest actions to a tile that is a goal, the other chef left out; 0 for other goals."""
     if goal == FREE or goal > joint.floor_of.size:
@@ -240,7 +240,7 @@ def _alone(joint: JointTables, costs: NDArray[int16], goal: int, pose: int) -> i
     return FAR if cost < 0 else int(cost)
 
 
-@njit(cache=True)
+@kernel
 def joint_step(
     joint: JointTables, costs: NDArray[int16], goal0: int, goal1: int, pose0: int, pose1: int, first: int
 ) -> int:
@@ -272,7 +272,7 @@ def joint_step(
     return best
 
 
-@njit(cache=True)
+@kernel
 def step_with_way(
     joint: JointTables, costs: NDArray[int16], goal0: int, goal1: int, first: int, pose0: int, pose1: int
 ) -> int:

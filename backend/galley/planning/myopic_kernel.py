@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy import bool_, int16
 from numpy.typing import NDArray
 
@@ -38,6 +37,7 @@ from galley.kitchen.codes import (
     TOMATO,
     TOMATO_DISPENSER,
 )
+from galley.planning.compiling import kernel
 
 # What the chef remembers of the tick before, int16 [MEMORY_SIZE].
 KNOWN = 0
@@ -55,12 +55,12 @@ MOST_WANDERS = 4
 NOWHERE = -1
 
 
-@njit(cache=True)
+@kernel
 def _tile(spec: NDArray[int16], cell: int) -> int:
     return int(spec[SPEC_TILES + cell])
 
 
-@njit(cache=True)
+@kernel
 def _dispenser_of(thing: int) -> int:
     """The tile that gives an ingredient or a dish."""
     if thing == DISH:
@@ -68,14 +68,14 @@ def _dispenser_of(thing: int) -> int:
     return ONION_DISPENSER if thing == ONION else TOMATO_DISPENSER
 
 
-@njit(cache=True)
+@kernel
 def _reaches(spec: NDArray[int16], reach: NDArray[bool_], seat: int, tile: int) -> bool:
     """Whether a seat can face some tile of this code."""
     tiles = spec[SPEC_TILES : SPEC_TILES + reach.shape[1]]
     return bool(np.any(reach[seat] & (tiles == tile)))
 
 
-@njit(cache=True)
+@kernel
 def _lying(state: NDArray[int16], spec: NDArray[int16], reach: NDArray[bool_], seat: int, thing: int) -> int:
     """How many of a thing lie on counters that a seat can reach."""
     count = 0
@@ -85,7 +85,7 @@ def _lying(state: NDArray[int16], spec: NDArray[int16], reach: NDArray[bool_], s
     return count
 
 
-@njit(cache=True)
+@kernel
 def _open_order(spec: NDArray[int16], state: NDArray[int16], ahead: int) -> int:
     """The ingredient of the order `ahead` places behind the first open one; NOTHING beyond the list's end."""
     place = state[ORDERS_DELIVERED] + ahead
@@ -94,7 +94,7 @@ def _open_order(spec: NDArray[int16], state: NDArray[int16], ahead: int) -> int:
     return int(spec[SPEC_TILES + spec[SPEC_WIDTH] * spec[SPEC_HEIGHT] + spec[SPEC_POTS] + place])
 
 
-@njit(cache=True)
+@kernel
 def _wanted(spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_]) -> int:
     """The ingredient of the next soup to begin: that of the first open order that no soup answers yet."""
     if spec[SPEC_ORDERS] == 0:
@@ -120,7 +120,7 @@ def _wanted(spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_]) 
     return kind
 
 
-@njit(cache=True)
+@kernel
 def _room(packed: int, wanted: int, ingredient: int, any_order: bool) -> int:
     """How many of an ingredient a pot can take, 0 if it should get none."""
     count = packed // POT_COUNT % POT_COUNT
@@ -130,7 +130,7 @@ def _room(packed: int, wanted: int, ingredient: int, any_order: bool) -> int:
     return INGREDIENTS_PER_SOUP - count if kind == ingredient else 0
 
 
-@njit(cache=True)
+@kernel
 def _need(
     spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], seat: int, thing: int, wanted: int,
     not_for: int,
@@ -148,7 +148,7 @@ def _need(
     return need
 
 
-@njit(cache=True)
+@kernel
 def _to_pass(
     spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], seat: int, thing: int, wanted: int
 ) -> bool:
@@ -160,7 +160,7 @@ def _to_pass(
     return bool(need > _lying(state, spec, reach, other, thing) + (state[CHEF * other + HELD] == thing))
 
 
-@njit(cache=True)
+@kernel
 def _free_counter(
     spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], costs: NDArray[int16], seat: int,
     shared: bool,
@@ -175,7 +175,7 @@ def _free_counter(
     return best
 
 
-@njit(cache=True)
+@kernel
 def _source(
     spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], costs: NDArray[int16], seat: int,
     thing: int, unshared: bool,
@@ -194,7 +194,7 @@ def _source(
     return best
 
 
-@njit(cache=True)
+@kernel
 def _nearest(spec: NDArray[int16], costs: NDArray[int16], tile: int) -> int:
     """The nearest tile of a code."""
     best = NOWHERE
@@ -204,7 +204,7 @@ def _nearest(spec: NDArray[int16], costs: NDArray[int16], tile: int) -> int:
     return best
 
 
-@njit(cache=True)
+@kernel
 def _drop(
     spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], costs: NDArray[int16], seat: int
 ) -> int:
@@ -218,13 +218,13 @@ def _drop(
     return apart
 
 
-@njit(cache=True)
+@kernel
 def _together(reach: NDArray[bool_]) -> bool:
     """Whether both chefs reach the same tiles."""
     return bool(np.all(reach[0] == reach[1]))
 
 
-@njit(cache=True)
+@kernel
 def _empty_handed(
     spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], costs: NDArray[int16], seat: int,
     wanted: int,
@@ -268,7 +268,7 @@ def _empty_handed(
     return NOWHERE
 
 
-@njit(cache=True)
+@kernel
 def _holding_ingredient(
     spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], costs: NDArray[int16], seat: int,
     wanted: int,
@@ -289,7 +289,7 @@ def _holding_ingredient(
     return _drop(spec, state, reach, costs, seat)
 
 
-@njit(cache=True)
+@kernel
 def _holding_dish(
     spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], costs: NDArray[int16], seat: int,
     wanted: int,
@@ -312,7 +312,7 @@ def _holding_dish(
     return _drop(spec, state, reach, costs, seat)
 
 
-@njit(cache=True)
+@kernel
 def _holding_soup(
     spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], costs: NDArray[int16], seat: int
 ) -> int:
@@ -328,7 +328,7 @@ def _holding_soup(
     return _free_counter(spec, state, reach, costs, seat, True)
 
 
-@njit(cache=True)
+@kernel
 def target(
     spec: NDArray[int16], all_costs: NDArray[int16], reach: NDArray[bool_], state: NDArray[int16], seat: int
 ) -> int:
@@ -346,7 +346,7 @@ def target(
     return _holding_soup(spec, state, reach, costs, seat)
 
 
-@njit(cache=True)
+@kernel
 def _planned(
     spec: NDArray[int16], all_costs: NDArray[int16], reach: NDArray[bool_], state: NDArray[int16], seat: int
 ) -> int:
@@ -370,7 +370,7 @@ def _planned(
     return STAY
 
 
-@njit(cache=True)
+@kernel
 def _ahead(spec: NDArray[int16], cell: int, facing: int) -> int:
     width = spec[SPEC_WIDTH]
     if facing < 2:
@@ -378,7 +378,7 @@ def _ahead(spec: NDArray[int16], cell: int, facing: int) -> int:
     return cell + 1 if facing == 2 else cell - 1
 
 
-@njit(cache=True)
+@kernel
 def stuck(state: NDArray[int16], seat: int, memory: NDArray[int16]) -> bool:
     """Whether the chef's last move changed neither its cell nor its facing."""
     chef = CHEF * seat
@@ -387,7 +387,7 @@ def stuck(state: NDArray[int16], seat: int, memory: NDArray[int16]) -> bool:
     return bool(tried and same)
 
 
-@njit(cache=True)
+@kernel
 def _in_the_way(spec: NDArray[int16], state: NDArray[int16], seat: int, memory: NDArray[int16]) -> bool:
     """Whether the other chef's last move failed because this one stood there."""
     other = state[CHEF * (1 - seat) + CELL]
@@ -397,7 +397,7 @@ def _in_the_way(spec: NDArray[int16], state: NDArray[int16], seat: int, memory: 
     return bool(_ahead(spec, other, asked) == state[CHEF * seat + CELL])
 
 
-@njit(cache=True)
+@kernel
 def _wander(spec: NDArray[int16], state: NDArray[int16], seat: int, back: int, draw: float) -> int:
     """A random move to a free cell, `back` only if there is no other; NOWHERE if there is none."""
     cell = state[CHEF * seat + CELL]
@@ -421,7 +421,7 @@ def _wander(spec: NDArray[int16], state: NDArray[int16], seat: int, back: int, d
     return NOWHERE
 
 
-@njit(cache=True)
+@kernel
 def decide(
     spec: NDArray[int16], all_costs: NDArray[int16], reach: NDArray[bool_], state: NDArray[int16], seat: int,
     memory: NDArray[int16], draw: float,
@@ -443,7 +443,7 @@ def decide(
     return action if move == NOWHERE else move
 
 
-@njit(cache=True)
+@kernel
 def remember(
     state: NDArray[int16], seat: int, memory: NDArray[int16], own_action: int, other_action: int, draw: float
 ) -> None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy import bool_, float32, float64, int16, int32, int64
 from numpy.typing import NDArray
 
@@ -37,6 +36,7 @@ from galley.kitchen.codes import (
     STAY,
 )
 from galley.kitchen.rules import step
+from galley.planning.compiling import kernel
 from galley.planning.joint_kernel import FAR, FREE, JointTables, joint_cost, joint_step
 from galley.planning.myopic_kernel import _wander, target
 from galley.planning.subtask_kernel import (
@@ -84,6 +84,8 @@ ROBOT_MEMORY = 8
 
 CROWDED_TICKS = 4
 """Added to both ways when no joint plan ends both, for instance two chefs bound for one narrow spot."""
+WAIT_TICKS = 3.0
+"""Added to the cost of waiting, or a robot in a crowd would put its work off for ever: the values know no crowd."""
 LEAST = 0.1
 """The weight of an action that leads one tick away from a subtask, beside 1 + LEAST for one that changes
 nothing and 2 + LEAST for one that leads a tick towards it."""
@@ -105,7 +107,7 @@ class Brain(NamedTuple):
     pots: NDArray[int64]  # [2]: how many there are, and 1 where chefs must pass things over counters
 
 
-@njit(cache=True)
+@kernel
 def _task_of(kind: int) -> int:
     """The subtask of the value tables for a kind of subtask."""
     if kind in (TAKE_ONION, TAKE_TOMATO):
@@ -121,7 +123,7 @@ def _task_of(kind: int) -> int:
     return PUT_DOWN if kind == DROP else IDLE
 
 
-@njit(cache=True)
+@kernel
 def _stand_of(held: int) -> int:
     if held == NOTHING:
         return AT_POT
@@ -130,7 +132,7 @@ def _stand_of(held: int) -> int:
     return WITH_DISH if held == 3 else WITH_SOUP
 
 
-@njit(cache=True)
+@kernel
 def world_of(spec: NDArray[int16], state: NDArray[int16], lying_soup: bool) -> int:
     """The world of the value tables that a state is in; a soup on a counter counts as one in a pot."""
     count = 0
@@ -148,20 +150,20 @@ def world_of(spec: NDArray[int16], state: NDArray[int16], lying_soup: bool) -> i
     return world(count, min(full, MOST_FULL), orders)
 
 
-@njit(cache=True)
+@kernel
 def _pose(brain: Brain, state: NDArray[int16], seat: int) -> int:
     chef = CHEF * seat
     return int(4 * brain.joint.floor_of[state[chef + CELL]] + state[chef + FACING])
 
 
-@njit(cache=True)
+@kernel
 def _alone(brain: Brain, state: NDArray[int16], seat: int, cell: int) -> int:
     """The fewest actions of a chef to a tile, the other left out of account."""
     chef = CHEF * seat
     return int(brain.costs[4 * state[chef + CELL] + state[chef + FACING], cell])
 
 
-@njit(cache=True)
+@kernel
 def _cooks_for(brain: Brain, state: NDArray[int16], cell: int) -> int:
     """The ticks until the soup in a full pot is ready; 0 for anything else."""
     packed = state[CELLS + cell]
@@ -170,7 +172,7 @@ def _cooks_for(brain: Brain, state: NDArray[int16], cell: int) -> int:
     return int(brain.spec[SPEC_COOK_TIME] - packed // POT_TICKS)
 
 
-@njit(cache=True)
+@kernel
 def pair_cost(brain: Brain, state: NDArray[int16], seat: int, mine: int, others: int) -> int:
     """The ticks until both chefs face their tiles (-1: anywhere) by a joint plan; FAR if there is none."""
     goal = FREE if mine < 0 else 1 + mine
@@ -181,7 +183,7 @@ def pair_cost(brain: Brain, state: NDArray[int16], seat: int, mine: int, others:
     return joint_cost(brain.joint, other, goal, pose0, pose1)
 
 
-@njit(cache=True)
+@kernel
 def _cost_to_go(
     brain: Brain, state: NDArray[int16], seat: int, kind: int, cell: int, human: int, human_cell: int
 ) -> float:
@@ -201,19 +203,22 @@ def _cost_to_go(
         return float(own + delay + _rank(kind))
     at = world_of(brain.spec, state, kind == TAKE_SOUP or human == TAKE_SOUP)
     pots, unit = int(brain.pots[0]), brain.unit[0]
-    human_left += delay
+    if alone > own:  # the chef with the longer way is the one that is held up
+        human_left += delay
     if cell < 0:
         stand = _stand_of(state[CHEF * seat + HELD])
-        return robot_waits(
+        return WAIT_TICKS + robot_waits(
             stand, human_task, human_left, at, pots, unit, brain.human_takes, brain.robot_next, False
         )
-    left = float(max(own, _cooks_for(brain, state, cell)) + 1 + delay)
+    left = float(max(own, _cooks_for(brain, state, cell)) + 1)
+    if alone <= own:
+        left += delay
     return both_busy(
         _task_of(kind), left, human_task, human_left, at, pots, unit, brain.robot_next, brain.human_next
     )
 
 
-@njit(cache=True)
+@kernel
 def _rank(kind: int) -> int:
     """The ticks by which the state machine puts a kind of subtask behind others."""
     if kind == WAIT:
@@ -223,7 +228,7 @@ def _rank(kind: int) -> int:
     return 40 if kind in (TAKE_ONION, TAKE_TOMATO) else 0
 
 
-@njit(cache=True)
+@kernel
 def likely(
     brain: Brain, state: NDArray[int16], seat: int, sees: bool, belief: NDArray[float64],
     weights: NDArray[float64], cells: NDArray[int64],
@@ -264,7 +269,7 @@ def likely(
     return best
 
 
-@njit(cache=True)
+@kernel
 def choose(
     brain: Brain, state: NDArray[int16], seat: int, weights: NDArray[float64], cells: NDArray[int64],
     values: NDArray[float64],
@@ -292,7 +297,7 @@ def choose(
     return best_kind, best_cell
 
 
-@njit(cache=True)
+@kernel
 def _toward(brain: Brain, state: NDArray[int16], seat: int, cell: int, human_cell: int) -> int:
     """The robot's part in the first tick of the joint plan to both tiles (-1: anywhere)."""
     mine, others = cell, human_cell
@@ -310,7 +315,7 @@ def _toward(brain: Brain, state: NDArray[int16], seat: int, cell: int, human_cel
     return joint_step(brain.joint, brain.costs, other, goal, pose0, pose1, 1) % 8
 
 
-@njit(cache=True)
+@kernel
 def robot_action(
     brain: Brain, state: NDArray[int16], seat: int, sees: bool, memory: NDArray[int16],
     belief: NDArray[float64], draw: float,
@@ -333,7 +338,7 @@ def robot_action(
     return action
 
 
-@njit(cache=True)
+@kernel
 def stuck(state: NDArray[int16], memory: NDArray[int16]) -> bool:
     """Whether someone tried to move and both chefs' cells and facings are as they were."""
     if not memory[KNOWN] or not _still(state, memory):
@@ -341,7 +346,7 @@ def stuck(state: NDArray[int16], memory: NDArray[int16]) -> bool:
     return bool(memory[ACTIONS_BEFORE] < STAY or memory[ACTIONS_BEFORE + 1] < STAY)
 
 
-@njit(cache=True)
+@kernel
 def _still(state: NDArray[int16], memory: NDArray[int16]) -> bool:
     return bool(
         state[CELL] == memory[POSES]
@@ -351,7 +356,7 @@ def _still(state: NDArray[int16], memory: NDArray[int16]) -> bool:
     )
 
 
-@njit(cache=True)
+@kernel
 def robot_observe(
     brain: Brain, state: NDArray[int16], seat: int, memory: NDArray[int16], belief: NDArray[float64],
     action0: int, action1: int, after: NDArray[int16], out: NDArray[int32],

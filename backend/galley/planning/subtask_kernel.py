@@ -6,7 +6,6 @@ order lists, tomatoes.
 
 from __future__ import annotations
 
-from numba import njit
 from numpy import bool_, int16
 from numpy.typing import NDArray
 
@@ -32,6 +31,7 @@ from galley.kitchen.codes import (
     TOMATO,
     TOMATO_DISPENSER,
 )
+from galley.planning.compiling import kernel
 from galley.planning.myopic_kernel import (
     _drop,
     _free_counter,
@@ -57,7 +57,7 @@ NEAREST = 3
 """Of the tiles where a subtask can be done, those considered."""
 
 
-@njit(cache=True)
+@kernel
 def _add(out: NDArray[int16], kind: int, cell: int, costs: NDArray[int16]) -> None:
     """Nothing; `cell` becomes one of the nearest tiles of a subtask if it is."""
     if cell < 0 or costs[cell] < 0:
@@ -75,7 +75,7 @@ def _add(out: NDArray[int16], kind: int, cell: int, costs: NDArray[int16]) -> No
     row[0] = min(count + 1, NEAREST)
 
 
-@njit(cache=True)
+@kernel
 def _sources(
     spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], costs: NDArray[int16], seat: int,
     thing: int, unshared: bool, kind: int, out: NDArray[int16],
@@ -97,7 +97,7 @@ def _sources(
             _add(out, kind, cell, costs)
 
 
-@njit(cache=True)
+@kernel
 def _with_empty_hands(
     spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], costs: NDArray[int16], seat: int,
     wanted: int, out: NDArray[int16],
@@ -124,7 +124,7 @@ def _with_empty_hands(
             _sources(spec, state, reach, costs, seat, kind, True, task, out)
 
 
-@njit(cache=True)
+@kernel
 def subtasks(
     spec: NDArray[int16], all_costs: NDArray[int16], reach: NDArray[bool_], state: NDArray[int16], seat: int,
     out: NDArray[int16],
@@ -173,7 +173,7 @@ def subtasks(
         _add(out, DROP, _drop(spec, state, reach, costs, seat), costs)
 
 
-@njit(cache=True)
+@kernel
 def kind_at(spec: NDArray[int16], held: int, cell: int) -> int:
     """The subtask of a chef with this in hand who means to interact with the tile at `cell` (-1: none)."""
     if cell < 0:
@@ -194,7 +194,7 @@ def kind_at(spec: NDArray[int16], held: int, cell: int) -> int:
     return FETCH if held == DISH else FILL
 
 
-@njit(cache=True)
+@kernel
 def kind_of(spec: NDArray[int16], state: NDArray[int16], seat: int, cell: int) -> int:
     """The subtask that a chef is at who means to interact with the tile at `cell` (-1: none)."""
     held = state[CHEF * seat + HELD]

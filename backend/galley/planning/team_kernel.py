@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy import float32, int16, int32, int64, uint8, uint64
 from numpy.typing import NDArray
 
@@ -39,6 +38,7 @@ from galley.kitchen.codes import (
     TOMATO,
 )
 from galley.kitchen.rules import finished, step
+from galley.planning.compiling import kernel
 from galley.planning.joint_kernel import FAR, FREE, joint_cost, joint_step, step_with_way
 from galley.planning.myopic_kernel import _open_order, _room, _wanted
 from galley.planning.robot_kernel import Brain, _alone, _cooks_for, _pose, _task_of, world_of
@@ -77,7 +77,7 @@ class Search(NamedTuple):
     times: NDArray[int16]  # [K], when first
 
 
-@njit(cache=True)
+@kernel
 def _pass_counters(
     brain: Brain, state: NDArray[int16], seat: int, out: NDArray[int16], summed: NDArray[int16]
 ) -> None:
@@ -94,7 +94,7 @@ def _pass_counters(
                 _add(out, DROP, cell, summed)
 
 
-@njit(cache=True)
+@kernel
 def team_options(
     brain: Brain, state: NDArray[int16], seat: int, orders: int, out: NDArray[int16], summed: NDArray[int16]
 ) -> None:
@@ -155,13 +155,13 @@ def team_options(
                 _add(out, DROP, cell, costs)
 
 
-@njit(cache=True)
+@kernel
 def _left(brain: Brain, state: NDArray[int16], seat: int, cell: int) -> float:
     """The ticks that a chef alone needs to interact with the tile at `cell`."""
     return float(max(_alone(brain, state, seat, cell), _cooks_for(brain, state, cell)) + 1)
 
 
-@njit(cache=True)
+@kernel
 def _stages(brain: Brain, state: NDArray[int16], orders: int) -> float:
     """A cost to go where things pass over counters: the steps that are left on the way of each thing needed."""
     spec = brain.spec
@@ -229,7 +229,7 @@ def _stages(brain: Brain, state: NDArray[int16], orders: int) -> float:
     return max(stages * STAGE_TICKS / 2 + near, last)
 
 
-@njit(cache=True)
+@kernel
 def to_go(
     brain: Brain, state: NDArray[int16], orders: int, options: NDArray[int16], summed: NDArray[int16]
 ) -> float:
@@ -252,7 +252,7 @@ def to_go(
     return best if best < np.inf else 500.0
 
 
-@njit(cache=True)
+@kernel
 def pair_to_go(
     brain: Brain, state: NDArray[int16], orders: int, kind0: int, cell0: int, kind1: int, cell1: int, delay: int
 ) -> float:
@@ -272,7 +272,7 @@ def pair_to_go(
     )  # fmt: skip
 
 
-@njit(cache=True)
+@kernel
 def walk(
     brain: Brain, state: NDArray[int16], cell0: int, cell1: int, wait0: bool, wait1: bool, first: int,
     leg: NDArray[uint8], out: NDArray[int32],
@@ -321,7 +321,7 @@ def walk(
     return 0
 
 
-@njit(cache=True)
+@kernel
 def _key(state: NDArray[int16]) -> uint64:
     """A hash of everything in a state but the tick."""
     word = uint64(1469598103934665603)
@@ -332,7 +332,7 @@ def _key(state: NDArray[int16]) -> uint64:
     return word | uint64(1)
 
 
-@njit(cache=True)
+@kernel
 def _met_before(search: Search, key: uint64, tick: int) -> bool:
     """Whether a state was met no later than at `tick`; notes it otherwise."""
     size = search.keys.size
@@ -351,7 +351,7 @@ def _met_before(search: Search, key: uint64, tick: int) -> bool:
     return False
 
 
-@njit(cache=True)
+@kernel
 def _place(search: Search, tick: int, total: float) -> int:
     """The number of the node that a new one of this estimate takes at a tick, -1 if none is worse."""
     width = search.parents.size // search.counts.size
@@ -365,7 +365,7 @@ def _place(search: Search, tick: int, total: float) -> int:
     return -1 if search.totals[worst] <= total else int(worst)
 
 
-@njit(cache=True)
+@kernel
 def search_plan(
     brain: Brain, search: Search, start: NDArray[int16], orders: int, pairs: int
 ) -> tuple[int, bool]:
@@ -443,7 +443,7 @@ def search_plan(
     return best_node, False
 
 
-@njit(cache=True)
+@kernel
 def _rate_pairs(
     brain: Brain, state: NDArray[int16], orders: int, options: NDArray[int16], rated: NDArray[float32],
     which: NDArray[int64], summed: NDArray[int16], ahead: NDArray[int16],

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy import int16, uint8, uint64
 from numpy.typing import NDArray
 
 from galley.kitchen.codes import INTERACT, TICK
 from galley.kitchen.rules import finished, reset
+from galley.planning.compiling import kernel
 from galley.planning.draw_kernel import draw
 from galley.planning.myopic_kernel import MEMORY_SIZE, decide, remember
 from galley.planning.robot_kernel import ROBOT_MEMORY, Brain, robot_action, robot_observe
@@ -25,7 +25,7 @@ NOISY_ACTION = 2
 LENGTH = 3
 
 
-@njit(cache=True)
+@kernel
 def _myopic(
     brain: Brain, state: NDArray[int16], seat: int, seed: uint64, epsilon: float, memory: NDArray[int16]
 ) -> int:
@@ -36,7 +36,7 @@ def _myopic(
     return int(decide(brain.spec, brain.costs, brain.reach, state, seat, memory, random))
 
 
-@njit(cache=True)
+@kernel
 def run_trials(
     brain: Brain, robot: int, seat: int, epsilon: float, robot_epsilon: float, seeds: NDArray[uint64],
     joint_actions: NDArray[uint8], ticks: NDArray[int16],

@@ -1,0 +1,1 @@
+"""What it means: teams evaluated on kitchens by the measures of their trials."""
