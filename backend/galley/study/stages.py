@@ -8,6 +8,7 @@ from typing import Annotated, Any, Final, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from galley.files import FileModel, Loc, faults
+from galley.study.counterbalance import MOST_SEQUENCES, permutations_count, sequences
 from galley.study.factors import (
     Conditions,
     LayoutName,
@@ -192,6 +193,21 @@ class Rounds(_Stage):
         """How many rounds a visit plays in this stage."""
         return len(self.layouts) * (len(self.agents) if self.pairs == "all" else 1)
 
+    def needed(self) -> dict[str, int]:
+        """How many participants of a cell balance each order that is counted through, by its key."""
+        layouts, agents = len(self.layouts), len(self.agents)
+        by_agent = self.blocks == "agent"
+        units = self.count if self.seats == "per_round" else layouts
+        counts = {"layout_order": sequences(self.layout_order, layouts, agents if by_agent else 1)}
+        if self.pairs == "all":
+            counts["agent_order"] = sequences(self.agent_order, agents, 1 if by_agent else layouts)
+        else:
+            of_pairs = {"latin_square": agents, "full": permutations_count(agents)}
+            counts["pairs"] = of_pairs.get(self.pairs, 0)
+        if not isinstance(self.seats, int):
+            counts["seat_order"] = {"latin_square": 2, "full": 2**units}.get(self.seat_order, 0)
+        return {key: count for key, count in counts.items() if count > 1}
+
     @field_validator("agents")
     @classmethod
     def _agents_differ(cls, agents: tuple[str, ...]) -> tuple[str, ...]:
@@ -207,7 +223,15 @@ class Rounds(_Stage):
 
     @model_validator(mode="after")
     def _keys_fit_together(self) -> Self:
-        found: list[tuple[Loc, str, str]] = []
+        found: list[tuple[Loc, str, str]] = [
+            (
+                (key,),
+                f"full counterbalancing here needs {count} participants in every cell",
+                f"use latin_square or random, or fewer layouts and agents (at most {MOST_SEQUENCES})",
+            )
+            for key, count in self.needed().items()
+            if count > MOST_SEQUENCES
+        ]
         if self.pairs != "all" and self.blocks == "agent":
             told = "blocks of one agent need every agent on every layout"
             found.append((("pairs",), told, "use `blocks: layout`, or `pairs: all`"))
