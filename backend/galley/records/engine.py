@@ -47,7 +47,7 @@ def sqlite_file(url: URL) -> Path | None:
 
 def shown(url: URL) -> str:
     """What messages call the database: its file, or its URL without the password."""
-    return str(sqlite_file(url) or url.render_as_string())
+    return str(sqlite_file(url) or url.set(drivername="postgresql").render_as_string())
 
 
 def connect(url: URL, *, writes: bool, migrates: bool = False) -> Engine:

@@ -11,7 +11,6 @@ from sqlalchemy import Connection
 
 from galley.errors import GalleyError
 from galley.kitchen import ACTIONS
-from galley.kitchen.codes import OUT_REWARD
 from galley.records import queries
 from galley.records.csv_file import CsvFile
 from galley.records.replay import Replayed, replay_round
@@ -124,7 +123,7 @@ class RoundExport:
         return {**chefs, **{name: getattr(found, name) for name in together}}
 
     def _write_ticks(self, file: CsvFile) -> None:
-        rewards = None if self.replay is None else self.replay.episode.out[:, OUT_REWARD].tolist()
+        rewards = None if self.replay is None else self.replay.rewards
         score = 0
         for number, tick in enumerate(self.ticks):
             reward = None if rewards is None else rewards[number]
@@ -145,7 +144,7 @@ class RoundExport:
 
     def _write_events(self, file: CsvFile) -> None:
         by = {None: None, self.human.seat: "human", self.partner.seat: "partner"}
-        for event in () if self.replay is None else self.replay.episode.events():
+        for event in () if self.replay is None else self.replay.events():
             columns = ("tick", "seat", "kind", "thing", "place", "x", "y", "reward")
             values = {name: getattr(event, name) for name in columns}
             file.write({**self.at, **values, "by": by[event.seat]})

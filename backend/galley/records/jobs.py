@@ -1,18 +1,28 @@
-"""Writes: what each job of the store does inside its transaction. Each may be done twice and counts once."""
+"""Writes about visits: what each job does in its transaction. Each may be done twice and counts once."""
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import Connection, Table, insert, select, update
+from sqlalchemy import Connection, Table, func, insert, select, update
 
 from galley.errors import GalleyError
 from galley.records.engine import insert_into
 from galley.records.queries import visit_row
 from galley.records.rows import VisitRow
-from galley.records.tables import RESPONSES, ROUNDS, SEATS, STAGES, STUDIES, VISITS
+from galley.records.tables import (
+    ABSENCES,
+    ATTEMPTS,
+    NOTES,
+    QUESTIONS,
+    RESPONSES,
+    SLOTS,
+    STAGES,
+    STUDIES,
+    VISITS,
+)
 
 NEW_VISIT: dict[str, Any] = {
     **dict.fromkeys(("completion_code", "ended_ms", "slot", "consent_sha256", "person")),
@@ -26,7 +36,7 @@ NEW_VISIT: dict[str, Any] = {
 
 def next_visit_no(connection: Connection, study: str) -> int:
     """The next number of a study, given out for good."""
-    _meet(connection, study)
+    meet(connection, study)
     # The update locks the row, so that two servers cannot read the same count.
     here = STUDIES.c.name == study
     connection.execute(update(STUDIES).where(here).values(visits_begun=STUDIES.c.visits_begun + 1))
@@ -35,17 +45,24 @@ def next_visit_no(connection: Connection, study: str) -> int:
 
 def create_visit(connection: Connection, values: Mapping[str, Any]) -> VisitRow:
     """The visit with these values, at its first step."""
-    _meet(connection, values["study"])
+    meet(connection, values["study"])
+    there = (
+        connection.execute(select(VISITS).where(VISITS.c.token == values["token"])).mappings().one_or_none()
+    )
+    if there is not None:  # this job was done before, but the server never heard of it
+        return visit_row(dict(there))
     whole = {**NEW_VISIT, "last_seen_ms": values["created_ms"], **values}
-    return visit_row({"id": _new_id(connection, VISITS, whole), **whole})
+    return visit_row({"id": new_id(connection, VISITS, whole), **whole})
 
 
-def _new_id(connection: Connection, table: Table, values: Mapping[str, Any]) -> int:
+def new_id(connection: Connection, table: Table, values: Mapping[str, Any]) -> int:
+    """The id of a new row."""
     return int(connection.execute(insert(table).values(**values).returning(table.c.id)).scalar_one())
 
 
-def _meet(connection: Connection, study: str) -> None:
-    row = {"name": study, "visits_begun": 0}
+def meet(connection: Connection, study: str) -> None:
+    """Make sure that there is a row for the study."""
+    row = {"name": study, "visits_begun": 0, "state": "open"}
     connection.execute(insert_into(connection.engine, STUDIES).values(**row).on_conflict_do_nothing())
 
 
@@ -59,76 +76,152 @@ def enter_step(connection: Connection, visit_id: int, step_id: str, at_ms: int) 
             index_elements=[STAGES.c.visit_id, STAGES.c.step_id], set_={"views": STAGES.c.views + 1}
         )
     )
+    seen(connection, visit_id, at_ms)
 
 
-def leave_step(
+def seen(connection: Connection, visit_id: int, at_ms: int) -> None:
+    """Note a sign of life."""
+    later = (VISITS.c.id == visit_id) & (VISITS.c.last_seen_ms < at_ms)
+    connection.execute(update(VISITS).where(later).values(last_seen_ms=at_ms))
+
+
+@dataclass(frozen=True, slots=True)
+class Left:
+    """A step that is left: its answers as rows without visit, step and time, and where the visit goes."""
+
+    visit_id: int
+    step_id: str
+    answers: Sequence[Mapping[str, Any]]
+    new_step_index: int
+    status: str
+    at_ms: int
+    completion_code: str | None
+    consent_sha256: str | None
+
+
+def leave_step(connection: Connection, left: Left) -> bool:
+    """Store the answers and move on, unless the step was left before or the visit is over.
+
+    Raises: GalleyError if the visit is unknown.
+    """
+    visit = active(connection, left.visit_id)
+    if visit is None:
+        return False
+    stage = insert_into(connection.engine, STAGES).values(
+        visit_id=left.visit_id, step_id=left.step_id, entered_ms=left.at_ms, left_ms=None, views=0
+    )
+    connection.execute(stage.on_conflict_do_nothing())
+    here = (STAGES.c.visit_id == left.visit_id) & (STAGES.c.step_id == left.step_id)
+    leaving = update(STAGES).where(here, STAGES.c.left_ms.is_(None)).values(left_ms=left.at_ms)
+    if connection.execute(leaving).rowcount == 0:
+        return False
+    if left.answers:
+        here_and_now = {"visit_id": left.visit_id, "step_id": left.step_id, "at_ms": left.at_ms}
+        connection.execute(insert(RESPONSES), [{**answer, **here_and_now} for answer in left.answers])
+        asked = [(answer["item"], answer["position"]) for answer in left.answers]
+        keep_questions(connection, visit, left.step_id, asked)
+    changes: dict[str, Any] = {"step_index": left.new_step_index, "tries": 0}
+    if left.consent_sha256 is not None:
+        changes["consent_sha256"] = left.consent_sha256
+    move(connection, left.visit_id, left.status, left.at_ms, left.completion_code, changes)
+    return True
+
+
+def active(connection: Connection, visit_id: int) -> Mapping[str, Any] | None:
+    """The visit's row, kept from others until this transaction is over; None if the visit is over.
+
+    Raises: GalleyError if the visit is unknown.
+    """
+    query = select(VISITS.c.study, VISITS.c.step_index, VISITS.c.status, VISITS.c.test)
+    found = (
+        connection.execute(query.where(VISITS.c.id == visit_id).with_for_update()).mappings().one_or_none()
+    )
+    if found is None:
+        raise GalleyError(f"there is no visit {visit_id}")
+    return dict(found) if found["status"] == "active" else None
+
+
+def move(
     connection: Connection,
     visit_id: int,
-    step_id: str,
-    answers: Sequence[Mapping[str, Any]],
-    new_step_index: int,
     status: str,
     at_ms: int,
     completion_code: str | None,
-) -> bool:
-    """Store the answers and move on, unless the step was left before."""
-    stage = insert_into(connection.engine, STAGES).values(
-        visit_id=visit_id, step_id=step_id, entered_ms=at_ms, left_ms=None, views=0
-    )
-    connection.execute(stage.on_conflict_do_nothing())
-    here = (STAGES.c.visit_id == visit_id) & (STAGES.c.step_id == step_id)
-    left = connection.execute(update(STAGES).where(here, STAGES.c.left_ms.is_(None)).values(left_ms=at_ms))
-    if left.rowcount == 0:
-        return False
-    if answers:
-        here_and_now = {"visit_id": visit_id, "step_id": step_id, "at_ms": at_ms}
-        connection.execute(insert(RESPONSES), [{**answer, **here_and_now} for answer in answers])
-    changes: dict[str, Any] = {"step_index": new_step_index, "status": status}
+    changes: Mapping[str, Any],
+) -> None:
+    """Change a visit; one that is over leaves its slot, completed or to be given out again."""
+    changes = {**changes, "status": status}
     if status != "active":
         changes["ended_ms"] = at_ms
     if completion_code is not None:
         changes["completion_code"] = completion_code
     connection.execute(update(VISITS).where(VISITS.c.id == visit_id).values(**changes))
+    seen(connection, visit_id, at_ms)
+    if status == "completed":
+        connection.execute(update(SLOTS).where(SLOTS.c.visit_id == visit_id).values(state="completed"))
+
+
+def end_visit(
+    connection: Connection, visit_id: int, status: str, at_ms: int, completion_code: str | None
+) -> bool:
+    """End a visit at the step where it is, unless it is over."""
+    if active(connection, visit_id) is None:
+        return False
+    move(connection, visit_id, status, at_ms, completion_code, {})
     return True
 
 
-def create_round(
-    connection: Connection, values: Mapping[str, Any], human: Mapping[str, Any], partner: Mapping[str, Any]
-) -> int:
-    """The id of the human's round at that step, made with these values if there is none.
-
-    Raises: GalleyError if the visit is unknown.
-    """
-    at_step = (SEATS.c.visit_id == human["visit_id"]) & (SEATS.c.step_id == human["step_id"])
-    there = connection.execute(select(SEATS.c.round_id).where(at_step)).scalar_one_or_none()
-    if there is not None:
-        return int(there)
-    its_study = select(VISITS.c.study).where(VISITS.c.id == human["visit_id"])
-    study = connection.execute(its_study).scalar_one_or_none()
-    if study is None:
-        raise GalleyError(f"there is no visit {human['visit_id']}")
-    empty = dict.fromkeys(("visit_id", "step_id", "agent", "agent_sha256", "hat"))
-    round_id = _new_id(connection, ROUNDS, {**values, "study": study, "status": "open"})
-    connection.execute(insert(SEATS), [{**empty, "round_id": round_id, **seat} for seat in (human, partner)])
-    return round_id
+def save_attempt(connection: Connection, visit_id: int, values: Mapping[str, Any]) -> bool:
+    """Keep a failed attempt at a quiz, unless it was kept before or the visit is over."""
+    if active(connection, visit_id) is None:
+        return False
+    new = insert_into(connection.engine, ATTEMPTS).values(visit_id=visit_id, **values)
+    if connection.execute(new.on_conflict_do_nothing()).rowcount == 0:
+        return False
+    changes = {"tries": values["attempt"], "last_seen_ms": values["at_ms"]}
+    connection.execute(update(VISITS).where(VISITS.c.id == visit_id).values(**changes))
+    return True
 
 
-def finish_round(
-    connection: Connection,
-    round_id: int,
-    status: str,
-    score: int,
-    deliveries: int,
-    ended_ms: int,
-    final_state: bytes,
-) -> bool:
-    """Close the round, unless it was closed before."""
-    closing = {
-        "status": status,
-        "score": score,
-        "deliveries": deliveries,
-        "ended_ms": ended_ms,
-        "final_sha256": hashlib.sha256(final_state).hexdigest(),
-    }
-    still_open = (ROUNDS.c.id == round_id) & (ROUNDS.c.status == "open")
-    return connection.execute(update(ROUNDS).where(still_open).values(**closing)).rowcount == 1
+def hidden(
+    connection: Connection, visit_id: int, step_id: str, started_ms: int, ended_ms: int | None
+) -> None:
+    """Note that a page was hidden, or that it is shown again."""
+    new = insert_into(connection.engine, ABSENCES).values(
+        visit_id=visit_id, step_id=step_id, started_ms=started_ms, ended_ms=ended_ms
+    )
+    over = {"ended_ms": func.coalesce(new.excluded.ended_ms, ABSENCES.c.ended_ms)}
+    same = [ABSENCES.c.visit_id, ABSENCES.c.started_ms]
+    connection.execute(new.on_conflict_do_update(index_elements=same, set_=over))
+
+
+def keep_questions(
+    connection: Connection, visit: Mapping[str, Any], step_id: str, items: Sequence[tuple[str, int]]
+) -> None:
+    """Make sure that the wide export has a column for each of these items, unless this is a test."""
+    rows = [
+        {
+            "study": visit["study"],
+            "step_id": step_id,
+            "item": item,
+            "place": visit["step_index"],
+            "position": at,
+        }
+        for item, at in items
+    ]
+    if not visit["test"]:
+        connection.execute(insert_into(connection.engine, QUESTIONS).on_conflict_do_nothing(), rows)
+
+
+def set_study_state(connection: Connection, study: str, state: str, at_ms: int) -> None:
+    """Open, pause or close a study for new visits."""
+    meet(connection, study)
+    changes = update(STUDIES).where(STUDIES.c.name == study).values(state=state, state_ms=at_ms)
+    connection.execute(changes)
+
+
+def add_note(connection: Connection, visit_id: int, author: str, text: str, at_ms: int) -> int:
+    """The id of a new note. Raises GalleyError if the visit is unknown."""
+    if connection.execute(select(VISITS.c.id).where(VISITS.c.id == visit_id)).first() is None:
+        raise GalleyError(f"there is no visit {visit_id}")
+    return new_id(connection, NOTES, {"visit_id": visit_id, "author": author, "text": text, "at_ms": at_ms})

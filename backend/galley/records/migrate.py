@@ -16,6 +16,7 @@ from sqlalchemy.exc import DatabaseError
 from galley.errors import GalleyError
 from galley.records.engine import connect, shown, sqlite_file
 from galley.records.lock import ServingLock
+from galley.records.patience import one_line
 
 SCRIPTS = Path(__file__).parent / "migrations"
 # Any number that nothing else in the database locks; replicas that start together take turns.
@@ -40,7 +41,7 @@ def migrate(url: URL, *, locked: bool, scripts: Path = SCRIPTS) -> None:
         with ServingLock(file) if file is not None and not locked else nullcontext():
             _upgrade(engine, shown(url), directory, config)
     except DatabaseError as error:
-        raise GalleyError(f"{shown(url)}: cannot be opened as records: {error.orig}") from None
+        raise GalleyError(f"{shown(url)}: cannot be opened as records: {one_line(error)}") from None
     finally:
         engine.dispose()
 

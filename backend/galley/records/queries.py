@@ -11,7 +11,7 @@ from sqlalchemy import Connection, Table, select
 
 from galley.errors import GalleyError
 from galley.records.rows import RoundRow, SeatRow, StandInRow, VisitRow
-from galley.records.tables import ROUNDS, SEATS, STAND_INS, TICKS, VISITS
+from galley.records.tables import RESPONSES, ROUNDS, SEATS, STAND_INS, STUDIES, TICKS, VISITS
 
 
 def studies(connection: Connection) -> tuple[str, ...]:
@@ -31,6 +31,21 @@ def visit(connection: Connection, token: str) -> VisitRow | None:
     """The visit with this token."""
     found = connection.execute(select(VISITS).where(VISITS.c.token == token)).mappings().one_or_none()
     return None if found is None else visit_row(dict(found))
+
+
+def study_state(connection: Connection, study: str) -> str:
+    """Whether a study takes new visits: open, paused or closed; one that nobody visited is open."""
+    return connection.execute(select(STUDIES.c.state).where(STUDIES.c.name == study)).scalar() or "open"
+
+
+def answers(connection: Connection, visit_id: int) -> dict[str, dict[str, Any]]:
+    """For each step of a visit that was answered, its answers by item, in the order of the page."""
+    columns = (RESPONSES.c.step_id, RESPONSES.c.item, RESPONSES.c.value)
+    query = select(*columns).where(RESPONSES.c.visit_id == visit_id)
+    found: dict[str, dict[str, Any]] = {}
+    for step_id, item, value in connection.execute(query.order_by(RESPONSES.c.at_ms, RESPONSES.c.position)):
+        found.setdefault(step_id, {})[item] = value
+    return found
 
 
 def visits(connection: Connection, study: str) -> Iterator[VisitRow]:

@@ -9,6 +9,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from galley.study.assignment import Slot
+
 
 @dataclass(frozen=True, slots=True)
 class VisitRow:
@@ -62,17 +64,15 @@ class Planned:
     seed: int
     plan_json: str
     condition: Mapping[str, Any]
+    cell: Mapping[str, Any] | None = None
+    """The cell of the design to count it in; the condition if None."""
 
 
 @dataclass(frozen=True, slots=True)
-class SlotRow:
-    """A slot that was given out: `completed` by its visit, or `ended` without, or on its way."""
+class SlotRow(Slot):
+    """A slot with the cell that it belongs to and the visit that has it, None once that was erased."""
 
-    number: int
     cell: dict[str, Any]
-    completed: bool
-    ended: bool
-    last_seen_ms: int
     visit_id: int | None
 
 

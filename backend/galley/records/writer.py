@@ -5,19 +5,20 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 from queue import Empty, SimpleQueue
 from typing import Any, Literal, TypeVar
 
-from sqlalchemy import Connection, Engine, func
-from sqlalchemy.exc import DBAPIError, OperationalError
+from sqlalchemy import Connection, Engine
 
 from galley.errors import GalleyError
-from galley.records.engine import insert_into
-from galley.records.rows import ClockRow, Health, KeyRow, PauseRow, TickRow
-from galley.records.tables import CLOCKS, KEYS, PAUSES, TICKS
+from galley.records import leases
+from galley.records.journal import Journal, JournalInserts
+from galley.records.leases import Lease
+from galley.records.patience import PATIENCE_S, Patience, one_line, passes
+from galley.records.rows import Health
 
 T = TypeVar("T")
 LOG = logging.getLogger(__name__)
@@ -26,26 +27,9 @@ LOG = logging.getLogger(__name__)
 # this wait, a tick of 150 ms and the commit stay within the second.
 FLUSH_EVERY_S = 0.75
 CLOSE_TRIES = 5
-
-
-@dataclass(slots=True)
-class Journal:
-    """Rows of one round that wait to be written."""
-
-    ticks: list[TickRow] = field(default_factory=list)
-    keys: list[KeyRow] = field(default_factory=list)
-    pauses: list[PauseRow] = field(default_factory=list)
-    clocks: list[ClockRow] = field(default_factory=list)
-
-    def extend(self, other: Journal) -> None:
-        """Take in rows that came after these."""
-        self.ticks += other.ticks
-        self.keys += other.keys
-        self.pauses += other.pauses
-        self.clocks += other.clocks
-
-    def __len__(self) -> int:
-        return len(self.ticks) + len(self.keys) + len(self.pauses) + len(self.clocks)
+# About 200 MB, or five minutes of 500 rounds, while the database is away.
+MOST_WAITING_ROWS = 1_000_000
+SEEN_EVERY_MS = 10_000
 
 
 @dataclass(slots=True)
@@ -53,23 +37,31 @@ class _Job:
     work: Callable[[Connection], Any] | None
     done: Future[Any]
     first: int | Literal["all"] | None
+    born_s: float = field(default_factory=time.monotonic)
 
 
 class Writer:
     """Owns every write of a process. Its methods return at once and may be called from any thread."""
 
-    def __init__(self, engine: Engine, flush_every_s: float = FLUSH_EVERY_S) -> None:
+    def __init__(
+        self, engine: Engine, flush_every_s: float = FLUSH_EVERY_S, patience_s: float = PATIENCE_S
+    ) -> None:
         self._engine = engine
-        self._insert = _inserts(engine)
+        self._inserts = JournalInserts(engine)
         self._flush_every_s = flush_every_s
+        self._patience_s = patience_s
         self._jobs: SimpleQueue[_Job | None] = SimpleQueue()
         self._lock = threading.Lock()
         self._waiting: dict[int, Journal] = {}
+        self._waiting_rows = 0
+        self._leases: dict[int, Lease] = {}
+        self._seen: dict[tuple[int, int], float] = {}
         self._flush_at = 0.0
         self._trouble = ""
         self._lost_rows = 0
+        self._fenced_rows = 0
         self._loss = ""
-        self._closed = False
+        self._closing = threading.Event()
         self._thread = threading.Thread(target=self._run, name="galley-writer", daemon=True)
         self._thread.start()
 
@@ -87,7 +79,7 @@ class Writer:
         # Running from the start: a request given up by its browser must not take its answer along.
         done.set_running_or_notify_cancel()
         with self._lock:
-            if self._closed:
+            if self._closing.is_set():
                 done.set_exception(GalleyError("the records are closed"))
                 return done
             self._jobs.put(_Job(work, done, first))
@@ -96,12 +88,28 @@ class Writer:
     def journal(self, round_id: int, rows: Journal) -> None:
         """Keep `rows` for the next flush. Raises GalleyError after `close`."""
         with self._lock:
-            if self._closed:
+            if self._closing.is_set():
                 raise GalleyError("the records are closed")
+            if self._waiting_rows + len(rows) > MOST_WAITING_ROWS:
+                self._count_lost(len(rows), f"more than {MOST_WAITING_ROWS} were waiting")
+                return
             if not self._waiting:
                 self._flush_at = time.monotonic() + self._flush_every_s
                 self._jobs.put(None)
             self._waiting.setdefault(round_id, Journal()).extend(rows)
+            self._waiting_rows += len(rows)
+
+    def hold(self, lease: Lease) -> None:
+        """Renew `lease` from now on."""
+        with self._lock:
+            self._leases[lease.round_id] = lease
+            self._jobs.put(None)
+
+    def let_go(self, lease: Lease) -> None:
+        """Renew it no longer."""
+        with self._lock:
+            if self._leases.get(lease.round_id) is lease:
+                del self._leases[lease.round_id]
 
     def flush(self) -> Future[None]:
         """Done when everything journalled before this call is committed."""
@@ -110,9 +118,8 @@ class Writer:
     def health(self) -> Health:
         """How writing fares now."""
         with self._lock:
-            waiting = sum(len(rows) for rows in self._waiting.values())
             message = self._trouble or self._loss
-            return Health(not message, message, waiting, self._lost_rows)
+            return Health(not message, message, self._waiting_rows, self._lost_rows, self._fenced_rows)
 
     def close(self) -> None:
         """Finish the jobs, write the journal, stop the thread.
@@ -120,9 +127,9 @@ class Writer:
         Raises: GalleyError if journalled rows could not be written.
         """
         with self._lock:
-            if self._closed:
+            if self._closing.is_set():
                 return
-            self._closed = True
+            self._closing.set()
             self._jobs.put(None)
         self._thread.join()
         health = self.health()
@@ -139,9 +146,10 @@ class Writer:
                 job = None
             if job is not None:
                 self._do(job)
-            elif self._closed and self._jobs.empty():
+            elif self._closing.is_set() and self._jobs.empty():
                 break
-            if self._waiting and time.monotonic() >= self._flush_at:
+            now = time.monotonic()
+            if (self._waiting and now >= self._flush_at) or self._due(now):
                 self._flush()
         for _ in range(CLOSE_TRIES):
             if not self._waiting or self._flush():
@@ -150,23 +158,39 @@ class Writer:
 
     def _rest_s(self) -> float | None:
         with self._lock:
-            return max(0.0, self._flush_at - time.monotonic()) if self._waiting else None
+            times = [lease.renew_at_s for lease in self._leases.values()]
+            if self._waiting:
+                times.append(self._flush_at)
+            return max(0.0, min(times) - time.monotonic()) if times else None
+
+    def _due(self, now_s: float) -> list[Lease]:
+        with self._lock:
+            return [lease for lease in self._leases.values() if lease.renew_at_s <= now_s]
 
     def _do(self, job: _Job) -> None:
-        try:
-            if job.first is not None and not self._flush(job.first):
-                raise GalleyError(f"the records cannot be written: {self._trouble}")
-            result = None
-            if job.work is not None:
-                with self._engine.begin() as connection:
-                    result = job.work(connection)
-                self._trouble = ""
-        except BaseException as error:  # handed to whoever waits for the job; the thread must live on
-            if isinstance(error, DBAPIError):
-                self._trouble = one_line(error)
-            job.done.set_exception(error)
-        else:
-            job.done.set_result(result)
+        patience = Patience(self._engine, job.born_s + self._patience_s, self._closing)
+        while True:
+            try:
+                if job.first is not None and not self._flush(job.first):
+                    raise _Unwritten
+                result = None
+                if job.work is not None:
+                    with self._engine.begin() as connection:
+                        result = job.work(connection)
+                    self._trouble = ""
+            except _Unwritten:
+                if patience.wait():
+                    continue
+                job.done.set_exception(GalleyError(f"the records cannot be written: {self._trouble}"))
+            except BaseException as error:  # handed to whoever waits for the job; the thread must live on
+                if passes(error):
+                    self._trouble = one_line(error)
+                    if patience.wait():
+                        continue
+                job.done.set_exception(patience.verdict(error))
+            else:
+                job.done.set_result(result)
+            return
 
     def _flush(self, which: int | Literal["all"] = "all") -> bool:
         """Whether the journal, or one round's part of it, is out of the way: committed or refused."""
@@ -175,80 +199,88 @@ class Writer:
                 batch, self._waiting = self._waiting, {}
             else:
                 batch = {which: self._waiting.pop(which)} if which in self._waiting else {}
-        return self._write(batch)
+            self._waiting_rows -= sum(map(len, batch.values()))
+        return self._write(batch, self._due(time.monotonic()))
 
-    def _write(self, batch: dict[int, Journal]) -> bool:
-        if not batch:
+    def _write(self, batch: dict[int, Journal], due: list[Lease]) -> bool:
+        if not batch and not due:
             return True
+        seen = self._seen_in(batch)
+        held = [rows.lease for rows in batch.values() if rows.lease is not None]
         try:
             with self._engine.begin() as connection:
-                for statement, rows in self._statements(batch):
-                    if rows:
-                        connection.execute(statement, rows)
+                lost = leases.fence(connection, held)
+                gone = {lease.round_id for lease in lost}
+                self._inserts.write(connection, {i: rows for i, rows in batch.items() if i not in gone})
+                self._inserts.write_seen(connection, seen)
+                renewing = [lease for lease in due if lease.round_id not in gone]
+                lost += leases.renew(connection, renewing)
         except Exception as error:  # any fault here must leave the rows somewhere
-            if _passes(error):
-                self._put_back(batch, one_line(error))
+            if passes(error):
+                self._put_back(batch, due, one_line(error))
+                return False
+            if not batch:
+                self._put_back({}, due, one_line(error))
                 return False
             if len(batch) > 1:  # one bad round must not take the others along
-                written = [self._write({round_id: rows}) for round_id, rows in batch.items()]
-                return all(written)
+                written = [self._write({round_id: rows}, []) for round_id, rows in batch.items()]
+                return all(written) and self._write({}, due)
             self._lose(batch, error)
-            return True
+            return self._write({}, due)
         self._trouble = ""
+        self._seen |= seen
+        for lease in due:
+            lease.renewed()
+        for lease in lost:
+            self._fence(lease, batch.get(lease.round_id))
         return True
 
-    def _put_back(self, batch: dict[int, Journal], trouble: str) -> None:
-        LOG.warning("the journal could not be written and will be tried again: %s", trouble)
+    def _seen_in(self, batch: dict[int, Journal]) -> dict[tuple[int, int], float]:
+        """Signs of life worth a write: the first, and the next some seconds later."""
+        return {
+            (round_id, seat): at_ms
+            for round_id, rows in batch.items()
+            for seat, at_ms in rows.seen().items()
+            if at_ms >= self._seen.get((round_id, seat), float("-inf")) + SEEN_EVERY_MS
+        }
+
+    def forget(self, round_id: int) -> None:
+        """Drop what is kept in memory about a round that is over. For jobs, in the writer's thread."""
+        for seat in (0, 1):
+            self._seen.pop((round_id, seat), None)
+
+    def _fence(self, lease: Lease, rows: Journal | None) -> None:
+        lease.lose()
+        self.let_go(lease)
+        with self._lock:
+            self._fenced_rows += len(rows or ())
+        LOG.warning("round %d was taken over by another server", lease.round_id)
+
+    def _put_back(self, batch: dict[int, Journal], due: list[Lease], trouble: str) -> None:
+        if trouble != self._trouble:
+            LOG.warning("the journal could not be written and will be tried again: %s", trouble)
+        again = time.monotonic() + self._flush_every_s
         with self._lock:
             self._trouble = trouble
             for round_id, rows in batch.items():
+                self._waiting_rows += len(rows)
                 if round_id in self._waiting:
                     rows.extend(self._waiting[round_id])
                 self._waiting[round_id] = rows
-            self._flush_at = time.monotonic() + self._flush_every_s
+            self._flush_at = again
+            for lease in due:
+                lease.renew_at_s = again
 
     def _lose(self, batch: dict[int, Journal], error: Exception) -> None:
         for round_id, rows in batch.items():
             with self._lock:
-                self._lost_rows += len(rows)
-                self._loss = f"{self._lost_rows} journal rows were refused by the database: {one_line(error)}"
+                self._count_lost(len(rows), one_line(error))
             LOG.error("round %d: %d journal rows were refused: %s", round_id, len(rows), one_line(error))
 
-    def _statements(self, batch: dict[int, Journal]) -> Iterator[tuple[Any, list[dict[str, Any]]]]:
-        """The inserts for `batch`. A row that is there already stays as it is; a pause learns its end."""
-        journals = batch.items()
-        yield self._insert[TICKS.name], _with_round((i, rows.ticks) for i, rows in journals)
-        yield self._insert[KEYS.name], _with_round((i, rows.keys) for i, rows in journals)
-        yield self._insert[PAUSES.name], _with_round((i, rows.pauses) for i, rows in journals)
-        yield self._insert[CLOCKS.name], _with_round((i, rows.clocks) for i, rows in journals)
+    def _count_lost(self, rows: int, why: str) -> None:
+        self._lost_rows += rows
+        self._loss = f"{self._lost_rows} journal rows were refused: {why}"
 
 
-def one_line(error: BaseException) -> str:
-    """What went wrong, without SQLAlchemy's statement and link."""
-    cause = error.orig if isinstance(error, DBAPIError) and error.orig is not None else error
-    return " ".join(str(cause).split()) or type(cause).__name__
-
-
-def _passes(error: Exception) -> bool:
-    """Whether trying again may help: the database was away, busy or full, rather than the rows wrong."""
-    cut_off = isinstance(error, DBAPIError) and error.connection_invalidated
-    return cut_off or isinstance(error, OperationalError)
-
-
-def _with_round(journals: Iterable[tuple[int, Iterable[Any]]]) -> list[dict[str, Any]]:
-    return [
-        {"round_id": round_id, **{name: getattr(row, name) for name in row.__slots__}}
-        for round_id, rows in journals
-        for row in rows
-    ]
-
-
-def _inserts(engine: Engine) -> dict[str, Any]:
-    kept = (TICKS, KEYS, CLOCKS)
-    inserts = {table.name: insert_into(engine, table).on_conflict_do_nothing() for table in kept}
-    pause = insert_into(engine, PAUSES)
-    ended = func.coalesce(pause.excluded.ended_ms, PAUSES.c.ended_ms)
-    inserts[PAUSES.name] = pause.on_conflict_do_update(
-        index_elements=[PAUSES.c.round_id, PAUSES.c.started_ms], set_={"ended_ms": ended}
-    )
-    return inserts
+class _Unwritten(Exception):
+    """What a job has to follow could not be written yet."""
