@@ -1,0 +1,56 @@
+"""Writes one export in a process of its own, so that no running round waits for it.
+
+Run as a module: reads one JSON object from standard input (`database`, `study`, `kind`, `tests`, `out`), writes
+the file `out`, and exits with 1 after one line on standard error when that cannot be done.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+import zipfile
+from pathlib import Path
+
+from galley.errors import GalleyError
+from galley.records import Store
+from galley.records.export import export_study
+from galley.records.trajectories import export_human_data, export_trajectories
+
+TABLES = ("csv", "jsonl", "parquet")
+
+
+def write_export(database: str, study: str, kind: str, tests: bool, out: Path) -> None:
+    """Write one kind of export of a study to the file `out`.
+
+    Raises: GalleyError when the database or the study is not there.
+    """
+    with Store.open(database, must_exist=True) as store:
+        if kind in TABLES:
+            with tempfile.TemporaryDirectory(dir=out.parent) as folder:
+                export_study(store, study, Path(folder), formats=(kind,), include_test=tests)
+                _zipped(Path(folder), out)
+        elif kind == "trajectories":
+            export_trajectories(store, study, out, include_test=tests)
+        else:
+            export_human_data(store, study, out, include_test=tests)
+
+
+def _zipped(folder: Path, out: Path) -> None:
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
+        for file in sorted(folder.iterdir()):
+            archive.write(file, file.name)
+
+
+def main() -> None:
+    """Do what standard input asks for."""
+    job = json.loads(sys.stdin.read())
+    try:
+        write_export(job["database"], job["study"], job["kind"], job["tests"], Path(job["out"]))
+    except (GalleyError, OSError) as error:
+        sys.stderr.write(f"{error}\n")
+        sys.exit(1)
+
+
+if __name__ == "__main__":
+    main()

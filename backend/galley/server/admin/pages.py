@@ -1,0 +1,66 @@
+"""All routes of the researcher's pages in one table, every one of them behind the gate."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable, Mapping
+
+from fastapi import APIRouter
+
+from galley.records import Store
+from galley.server.admin.desk import Desk
+from galley.server.admin.downloads import DownloadPages
+from galley.server.admin.gate import HOME, LOGIN, Gate
+from galley.server.admin.rounds import RoundPages
+from galley.server.admin.shown import templates
+from galley.server.admin.studies import StudyPages
+from galley.server.admin.visits import VisitPages
+from galley.server.clock import Clock
+from galley.study.study import Study
+
+
+def researcher_pages(
+    *,
+    store: Store,
+    database: str,
+    studies: Mapping[str, Study],
+    folder: str,
+    clock: Clock,
+    stop_visit: Callable[[int], Awaitable[None]],
+) -> APIRouter:
+    """The routes under /researcher. `folder` holds the templates; for the rest see Desk."""
+    environment = templates(folder)
+    gate = Gate(store, environment, clock)
+    desk = Desk(store, database, studies, environment, clock, gate, stop_visit)
+    about_studies, about_visits = StudyPages(desk), VisitPages(desk)
+    about_rounds, files = RoundPages(desk), DownloadPages(desk)
+
+    router = APIRouter()
+    router.add_route(LOGIN, gate.login_page, methods=["GET"])
+    router.add_route(LOGIN, gate.login, methods=["POST"])
+    pages = {
+        "": about_studies.home,
+        "/studies/{study}": about_studies.study,
+        "/studies/{study}/visits": about_studies.visits,
+        "/studies/{study}/rounds": about_studies.rounds,
+        "/studies/{study}/download/{kind}": files.download,
+        "/visits/{visit:int}": about_visits.visit,
+        "/rounds/{round:int}": about_rounds.round,
+    }
+    data = {
+        "/live.json": about_studies.home_live,
+        "/studies/{study}/live.json": about_studies.study_live,
+        "/rounds/{round:int}/replay.json": about_rounds.replay,
+    }
+    deeds = {
+        "/logout": gate.logout,
+        "/studies/{study}/state": about_studies.set_state,
+        "/visits/{visit:int}/notes": about_visits.note,
+        "/visits/{visit:int}/erase": about_visits.erase,
+    }
+    for path, page in pages.items():
+        router.add_route(f"{HOME}{path}", gate.page(page), methods=["GET"])
+    for path, page in data.items():
+        router.add_route(f"{HOME}{path}", gate.data(page), methods=["GET"])
+    for path, deed in deeds.items():
+        router.add_route(f"{HOME}{path}", gate.deed(deed), methods=["POST"])
+    return router

@@ -1,0 +1,52 @@
+"""Numbers of the records put together for the researcher's pages."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from galley.study.study import Study
+
+UNDER_WAY = "active"
+DONE = "completed"
+
+
+def study_rows(found: Iterable[Any], served: Mapping[str, Study]) -> list[dict[str, Any]]:
+    """One row per study that is served or was visited (StudyOverview), by name."""
+    rows: dict[str, dict[str, Any]] = {}
+    for name, study in served.items():
+        rows[name] = _row(name, study.title, "open", {}, 0, 0, served=True)
+    for row in found:
+        title = served[row.name].title if row.name in served else row.name
+        rows[row.name] = _row(
+            row.name, title, row.state, row.by_status, row.tests, row.open_rounds, served=row.name in served
+        )
+    return [rows[name] for name in sorted(rows)]
+
+
+def _row(
+    name: str, title: str, state: str, by_status: Mapping[str, int], tests: int, open_rounds: int, *, served: bool
+) -> dict[str, Any]:
+    begun = sum(by_status.values())
+    return {
+        "name": name,
+        "title": title,
+        "state": state,
+        "served": served,
+        "begun": begun,
+        "active": by_status.get(UNDER_WAY, 0),
+        "completed": by_status.get(DONE, 0),
+        "left": begun - by_status.get(UNDER_WAY, 0) - by_status.get(DONE, 0),
+        "by_status": dict(by_status),
+        "tests": tests,
+        "open_rounds": open_rounds,
+    }
+
+
+def flag_tallies(flags: Mapping[int, Iterable[Any]]) -> list[dict[str, Any]]:
+    """One row per kind of flag with how many visits have it, most first; `flags` are Flags by visit."""
+    kinds: dict[str, int] = {}
+    for of_visit in flags.values():
+        for kind in {flag.kind for flag in of_visit}:
+            kinds[kind] = kinds.get(kind, 0) + 1
+    return [{"kind": kind, "visits": count} for kind, count in sorted(kinds.items(), key=lambda pair: -pair[1])]
