@@ -47,6 +47,11 @@
  * @property {boolean} tutorial
  * @property {string[] | null} orders
  * @property {Effect[]} effects
+ * @property {number | null} points of one soup
+ * @property {number} episode
+ * @property {number} episodes
+ * @property {"during" | "after" | "never"} showScore
+ * @property {boolean} alone nobody is on the other seat
  */
 
 export const NEVER = -1e9;
@@ -81,6 +86,8 @@ export function boardFrom(frame) {
       [cellKey(x, y), { kind, count, ticks, ready: Boolean(ready), at: NEVER }])),
     score: frame.score, scoredAt: NEVER, goal: frame.goal, round: frame.round, of: frame.of,
     tutorial: frame.tutorial, orders: frame.orders, effects: [],
+    points: frame.points ?? null, episode: frame.episode ?? 1, episodes: frame.episodes ?? 1,
+    showScore: frame.show_score ?? "during", alone: frame.partner === "none",
   };
 }
 
@@ -136,7 +143,7 @@ function addEvent(board, [kind, seat, , , x, y], gained, now) {
   if (kind === "soup_ready") board.effects.push({ kind: "sparkle", x, y, at: now, text: "" });
   if (kind === "delivery") {
     board.effects.push({ kind: "sparkle", x, y, at: now, text: "" });
-    board.effects.push({ kind: "points", x, y, at: now, text: gained > 0 ? `+${gained}` : "0" });
+    if (board.showScore === "during") board.effects.push({ kind: "points", x, y, at: now, text: gained > 0 ? `+${gained}` : "0" });
   }
 }
 

@@ -50,6 +50,7 @@ export function draw(context, board, sprites, kitchen, now) {
     layers.push([y, () => drawThing(context, sprites, thing, x + 0.5, y + middle(board.grid, x, y), quiet ? 1 : pop(now, at))]);
   }
   board.chefs.forEach((chef, seat) => {
+    if (board.alone && seat !== board.seat) return;
     const [x, y] = seen[seat] ?? [chef.x, chef.y];
     layers.push([y + 0.5, () => drawChef(context, board, chef, seat, x, y, sprites, now, quiet)]);
   });

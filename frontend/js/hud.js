@@ -1,7 +1,10 @@
 /** What stands around the kitchen: score, goal, time, and the card that lies over it between phases. */
 
+import { clock, fill } from "./words.js";
+
 /** @typedef {import("./board.js").Board} Board */
 /** @typedef {import("./wire.js").Key} Key */
+/** @typedef {import("./words.js").Say} Say */
 
 /**
  * @typedef {object} Card
@@ -18,9 +21,10 @@ const LOW_S = 10;
 const STORED = "galley-keys-used";
 
 export class Hud {
-  /** @param {HTMLElement} root */
-  constructor(root) {
+  /** @param {HTMLElement} root @param {Say} say */
+  constructor(root, say) {
     this.root = root;
+    this.say = say;
     this.card = "";
     this.cardTimer = 0;
     this.runDown = 0;
@@ -52,7 +56,8 @@ export class Hud {
   update(board) {
     const leftMs = (board.horizon - board.tick) * board.tickMs;
     const seconds = Math.ceil(leftMs / 1000);
-    this.write("time", `${Math.floor(seconds / 60)}:${String(seconds % 60).padStart(2, "0")}`);
+    this.write("time", clock(seconds));
+    if (board.episodes > 1) this.write("episode", this.say("game", { n: board.episode, of: board.episodes }));
     this.bar("time-bar", board.horizon - board.tick, board.horizon);
     this.root.classList.toggle("hurry", board.phase === "playing" && seconds <= LOW_S);
     this.write("score", String(board.score));
@@ -95,7 +100,7 @@ export class Hud {
 
   /** @param {string} text @param {number | undefined} seconds */
   tell(text, seconds) {
-    this.write("card-text", text.replace("{s}", String(seconds ?? "")));
+    this.write("card-text", fill(text, { s: seconds ?? "" }));
     if (seconds) this.runDown = window.setTimeout(() => this.tell(text, seconds - 1), 1000);
   }
 

@@ -60,7 +60,7 @@ function redraw(figure, images) {
   }), sprites, kitchen, 0);
   canvas.className = "kitchen-canvas";
   canvas.setAttribute("role", "img");
-  canvas.setAttribute("aria-label", tiles.getAttribute("aria-label") ?? "A kitchen");
+  canvas.setAttribute("aria-label", tiles.getAttribute("aria-label") ?? "");
   canvas.style.width = `${kitchen.width / density}px`;
   tiles.replaceWith(canvas);
 }

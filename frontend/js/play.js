@@ -8,21 +8,23 @@ import { Sounds } from "./sound.js";
 import { loadImages } from "./sprites.js";
 import { View } from "./view.js";
 import { key, ready, release } from "./wire.js";
+import { wordsOf } from "./words.js";
 
 /** @typedef {import("./board.js").Board} Board */
 /** @typedef {import("./connection.js").Link} Link */
 /** @typedef {import("./wire.js").Keyframe} Keyframe */
 /** @typedef {import("./wire.js").ServerMessage} ServerMessage */
+/** @typedef {import("./words.js").Say} Say */
 
 const END_CARD_MS = 1300;
-const POINTS_A_SOUP = 20;
 
 class Round {
-  /** @param {HTMLElement} root @param {View} view */
-  constructor(root, view) {
+  /** @param {HTMLElement} root @param {View} view @param {Say} say */
+  constructor(root, view, say) {
     this.root = root;
     this.view = view;
-    this.hud = new Hud(root);
+    this.say = say;
+    this.hud = new Hud(root, say);
     const toggle = root.querySelector('[data-part="sound"]');
     this.sounds = new Sounds(toggle instanceof HTMLButtonElement ? toggle : null);
     /** @type {Board | null} */
@@ -47,7 +49,7 @@ class Round {
       case "keyframe": this.start(message); break;
       case "countdown": this.count(message.seconds); break;
       case "tick": this.step(message); break;
-      case "paused": this.pause(message.seconds_left); break;
+      case "paused": this.pause(message.reason, message.seconds_left); break;
       case "ended": this.end(message.outcome, message.score, message.next); break;
       case "refused": console.warn("the server refused a message:", message.reason); break;
       default: break;
@@ -66,13 +68,14 @@ class Round {
   }
 
   invite() {
-    const { title, text } = this.root.dataset;
-    this.hud.show({ kind: "start", title: title ?? "Ready?", text: text ?? "", button: "Start", press: () => this.go() });
+    const { title = "", text = "" } = this.root.dataset;
+    this.hud.show({ kind: "start", title, text, button: this.say("start"), press: () => this.go() });
   }
 
   go() {
     this.link.send(ready());
     this.keys.enable(true);
+    if (this.root.dataset.partner === "human") this.hud.show({ kind: "waiting", title: this.say("waiting"), text: this.say("waiting_text") });
   }
 
   /** @param {number} seconds */
@@ -81,7 +84,8 @@ class Round {
     this.view.redraw();
     this.keys.enable(true);
     if (seconds > 0) {
-      this.hud.show({ kind: "count", title: String(seconds) });
+      const { episode = 1, episodes = 1 } = this.board ?? {};
+      this.hud.show({ kind: "count", title: String(seconds), text: episodes > 1 ? this.say("game", { n: episode, of: episodes }) : "" });
       this.sounds.play("count");
     } else this.hud.hide();
   }
@@ -105,17 +109,19 @@ class Round {
     }
   }
 
-  /** @param {number} secondsLeft */
-  pause(secondsLeft) {
+  /** @param {string} reason @param {number} secondsLeft */
+  pause(reason, secondsLeft) {
     if (this.board) this.board.phase = "paused";
     this.keys.enable(false);
-    this.hud.show({
-      kind: "paused", title: "Paused", button: "Go on", press: () => this.go(),
-      text: "The kitchen waits for you, {s} seconds more.", until: secondsLeft,
-    });
+    const { say } = this;
+    if (reason === "partner") {
+      this.hud.show({ kind: "waiting", title: say("partner_away"), text: say("partner_away_text"), until: secondsLeft });
+    } else {
+      this.hud.show({ kind: "paused", title: say("paused"), button: say("go_on"), press: () => this.go(), text: say("paused_text"), until: secondsLeft });
+    }
   }
 
-  /** @param {"finished" | "abandoned"} outcome @param {number} score @param {string} next */
+  /** @param {string} outcome @param {number} score @param {string} next */
   end(outcome, score, next) {
     this.over = true;
     const board = this.board;
@@ -125,42 +131,44 @@ class Round {
     }
     this.keys.enable(false);
     this.sounds.play("end");
+    const { say } = this;
     const press = () => location.assign(next || this.root.dataset.next || location.href);
-    if (outcome === "abandoned") {
-      this.hud.show({ kind: "end", title: "This round has closed", text: "It waited too long. You can go on with the next page.", button: "Continue", press });
-      return;
-    }
-    this.hud.show({ kind: "end", title: "Time is up!", text: summary(board, score), button: "Continue", press, after: END_CARD_MS });
+    const [title, text] = outcome === "finished" ? [say("over"), summary(board, score, this.root.dataset.bonus, say)]
+      : outcome === "partner_left" ? [say("partner_left"), say("partner_left_text")] : [say("closed"), say("closed_text")];
+    this.hud.show({ kind: "end", title, text, button: say("continue"), press, after: END_CARD_MS });
   }
 
   /** @param {Link} link */
   linked(link) {
     if (this.over) return;
+    const { say } = this;
+    const reload = () => location.reload();
     if (link === "lost") {
       if (this.board?.phase === "playing") this.board.phase = "paused";
       this.keys.enable(false);
-      this.hud.show({ kind: "lost", title: "Connection lost", text: "Trying to come back. Your round is kept." });
+      this.hud.show({ kind: "lost", title: say("lost"), text: say("lost_text") });
     }
     if (link === "elsewhere") {
       this.keys.enable(false);
-      this.hud.show({
-        kind: "elsewhere", title: "This round is open in another tab",
-        text: "Play on there, or take it back into this tab.", button: "Play here", press: () => location.reload(),
-      });
+      this.hud.show({ kind: "elsewhere", title: say("elsewhere"), text: say("elsewhere_text"), button: say("play_here"), press: reload });
     }
     if (link === "over") location.assign(this.root.dataset.next ?? location.href);
     if (link === "refused") {
-      this.hud.show({ kind: "lost", title: "This page is out of date", text: "Please load it again.", button: "Load again", press: () => location.reload() });
+      this.hud.show({ kind: "lost", title: say("out_of_date"), text: say("out_of_date_text"), button: say("load_again"), press: reload });
     }
   }
 }
 
-/** @param {Board | null} board @param {number} score @returns {string} */
-function summary(board, score) {
-  const soups = score / POINTS_A_SOUP;
-  const served = Number.isInteger(soups) ? `You two served ${soups} ${soups === 1 ? "soup" : "soups"}: ${score} points.` : `You two made ${score} points.`;
-  if (board === null || board.goal === null) return served;
-  return score >= board.goal ? `${served} That is the goal!` : `${served} The goal was ${board.goal}.`;
+/** What the card at the end says: soups and points if they may be known, and what came of the goal.
+ * @param {Board | null} board @param {number} score @param {string | undefined} bonus @param {Say} say */
+function summary(board, score, bonus, say) {
+  if (board === null || board.showScore === "never") return say("over_text");
+  const soups = board.points ? score / board.points : NaN;
+  const told = Number.isInteger(soups) ? [say("soups", { soups })] : [];
+  told.push(say("points", { points: score }));
+  if (board.goal !== null && score >= board.goal) told.push(bonus ? say("bonus_earned", { bonus }) : say("goal_reached"));
+  else if (board.goal !== null) told.push(say("goal_missed", { goal: board.goal }));
+  return told.join(" ");
 }
 
 const root = document.getElementById("kitchen");
@@ -168,5 +176,5 @@ const canvas = root?.querySelector("canvas");
 const room = root?.querySelector('[data-part="room"]');
 if (root && canvas && room instanceof HTMLElement) {
   const images = await loadImages(root.dataset.sprites ?? "/static/sprites/");
-  new Round(root, new View(canvas, room, images));
+  new Round(root, new View(canvas, room, images), wordsOf("words"));
 }

@@ -5,15 +5,15 @@
 
 export const FACINGS = /** @type {const} */ (["north", "south", "east", "west"]);
 
-/** Hat colours (Okabe and Ito, Color Universal Design, 2008), with the mark and the word people see. */
-export const HATS = Object.freeze(/** @type {Record<string, {colour: string, mark: string, word: string}>} */ ({
-  "orange": { colour: "#E69F00", mark: "circle", word: "orange" },
-  "sky-blue": { colour: "#56B4E9", mark: "diamond", word: "light blue" },
-  "bluish-green": { colour: "#009E73", mark: "triangle", word: "green" },
-  "vermillion": { colour: "#D55E00", mark: "square", word: "red" },
-  "blue": { colour: "#0072B2", mark: "star", word: "dark blue" },
-  "reddish-purple": { colour: "#CC79A7", mark: "cross", word: "pink" },
-  "yellow": { colour: "#F0E442", mark: "heart", word: "yellow" },
+/** Hat colours (Okabe and Ito, Color Universal Design, 2008), with the mark on each. */
+export const HATS = Object.freeze(/** @type {Record<string, {colour: string, mark: string}>} */ ({
+  "orange": { colour: "#E69F00", mark: "circle" },
+  "sky-blue": { colour: "#56B4E9", mark: "diamond" },
+  "bluish-green": { colour: "#009E73", mark: "triangle" },
+  "vermillion": { colour: "#D55E00", mark: "square" },
+  "blue": { colour: "#0072B2", mark: "star" },
+  "reddish-purple": { colour: "#CC79A7", mark: "cross" },
+  "yellow": { colour: "#F0E442", mark: "heart" },
 }));
 
 /** Drawing by thing code; 0 is nothing. */

@@ -47,6 +47,12 @@ export const CLOSE = Object.freeze({ elsewhere: 4001, over: 4002, refused: 4003 
  * @property {number} of
  * @property {boolean} tutorial
  * @property {string[] | null} orders
+ * @property {number} [points] of one soup
+ * @property {number} [episode] of the round, from 1; `tick` and `horizon` are its own, `score` is the round's
+ * @property {number} [episodes]
+ * @property {"during" | "after" | "never"} [show_score]
+ * @property {"hold" | "press"} [input_mode]
+ * @property {"agent" | "human" | "none"} [partner]
  */
 /**
  * @typedef {object} Tick what one tick changed
@@ -60,7 +66,7 @@ export const CLOSE = Object.freeze({ elsewhere: 4001, over: 4002, refused: 4003 
  */
 /** @typedef {{type: "countdown", seconds: number}} Countdown */
 /** @typedef {{type: "paused", reason: string, seconds_left: number}} Paused */
-/** @typedef {{type: "ended", outcome: "finished" | "abandoned", score: number, next: string}} Ended */
+/** @typedef {{type: "ended", outcome: string, score: number, next: string}} Ended */
 /** @typedef {{type: "pong", client_ms: number, server_ms: number}} Pong */
 /** @typedef {{type: "elsewhere"}} Elsewhere */
 /** @typedef {{type: "refused", reason: string}} Refused */

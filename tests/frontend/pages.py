@@ -6,87 +6,100 @@ from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
-from galley.server.pages import templates
+from galley.server.templates import templates
 from galley.study.questionnaire import Questionnaire
+from galley.study.recruitment import VISIT_OUTCOMES
 
 FRONTEND = Path(__file__).parents[2] / "frontend"
 HOSTILE = "<script>alert(1)</script>\"'><img src=x onerror=alert(1)>"
+LEAVING = "https://example.org/?a=1&b=2"
 FIRST_HAT, SECOND_HAT = "orange", "sky-blue"
 
 
-def _scale(kind: str, item_id: str, **more: Any) -> dict[str, Any]:
-    ends = {"low_label": f"low {HOSTILE}", "high_label": "high"}
-    return {"id": item_id, "kind": kind, "text": f"{item_id} {HOSTILE}", **ends, **more}
+def questionnaire(words: str = HOSTILE) -> Questionnaire:
+    """One of each kind of item, every text of it the same words."""
+    options = ({"value": "a", "label": words}, {"value": "b", "label": words})
+    ends = {"text": words, "low_label": words, "high_label": words}
+    plain = {"text": words, "required": False}
+    items = (
+        {"id": "radio", "kind": "likert", "help": words, **ends},
+        {"id": "stars", "kind": "likert", "style": "stars", "scale": 5, **ends},
+        {"id": "worded", "kind": "likert", "scale": 3, "labels": (words, words, words), **ends},
+        {"id": "effort", "kind": "likert", "scale": 21, **ends},
+        {"id": "percent", "kind": "likert", "scale": 31, **ends},
+        {"id": "poles", "kind": "semantic_differential", "scale": 5, **ends},
+        {"id": "versus", "kind": "comparison", **ends},
+        {"id": "line", "kind": "slider", "unit": words, "show_value": True, **ends},
+        {"id": "half", "kind": "slider", "min": 0, "max": 1, "step": 0.5, **ends},
+        {"id": "ranks", "kind": "ranking", "text": words, "options": options},
+        {"id": "one", "kind": "single_choice", "text": words, "options": options, "expected": "b"},
+        {
+            "id": "many",
+            "kind": "multiple_choice",
+            "text": words,
+            "options": options,
+            "when": {"item": "one", "any_of": ("a", "b")},
+        },
+        {"id": "age", "kind": "number", "min": 1, "max": 9, "unit": words, **plain},
+        {"id": "name", "kind": "short_text", **plain},
+        {"id": "story", "kind": "long_text", **plain},
+    )
+    return Questionnaire.model_validate(
+        {"format": 1, "title": words, "source": "made for tests", "intro": words, "items": items}
+    )
 
 
-OPTIONS = [{"value": "a", "label": HOSTILE}, {"value": "b", "label": "B"}]
-QUESTIONNAIRE = Questionnaire.model_validate(
-    {
-        "format": 1,
-        "title": HOSTILE,
-        "source": "made for tests",
-        "intro": HOSTILE,
-        "items": (
-            _scale("likert", "radio", help=HOSTILE),
-            _scale("likert", "stars", style="stars", scale=5),
-            _scale("likert", "worded", scale=3, labels=("no", HOSTILE, "yes")),
-            _scale("comparison", "versus"),
-            {"id": "one", "kind": "single_choice", "text": "One", "options": tuple(OPTIONS)},
-            {
-                "id": "many",
-                "kind": "multiple_choice",
-                "text": "Many",
-                "options": tuple(OPTIONS),
-                "when": {"item": "one", "any_of": ("a", "b")},
-            },
-            {
-                "id": "age",
-                "kind": "number",
-                "text": "Age",
-                "min": 1,
-                "max": 9,
-                "unit": HOSTILE,
-                "required": False,
-            },
-            {"id": "line", "kind": "short_text", "text": "Line", "required": False},
-            {"id": "lines", "kind": "long_text", "text": "Lines", "required": False},
-        ),
-    }
-)
+QUESTIONNAIRE = questionnaire()
+OUTCOMES = (*VISIT_OUTCOMES, "full", "later", "paused", "closed")
 
 
-def contexts() -> dict[str, dict[str, Any]]:
-    """What each template is given, as `galley.server.pages` gives it."""
-    study = {"name": "demo", "title": HOSTILE, "about": HOSTILE, "minutes": 12}
+def contexts(words: str = HOSTILE) -> dict[str, dict[str, Any]]:
+    """What each template is given, as the server gives it; the study says the same words everywhere."""
+    study = {"name": "demo", "title": words, "about": words, "minutes": 12}
+    clock = {"seconds_left": 250, "wait_s": 40, "early": True, "skippable": True, "test": True}
 
     def visit(kind: str, **more: Any) -> dict[str, Any]:
         hats = {"partner_hat": FIRST_HAT, "human_hat": "blue"}
-        step = {"id": f"{kind}-1", "kind": kind, "title": HOSTILE, "round_no": 1, **hats}
+        step = {"id": f"{kind}-1", "kind": kind, "title": words, "round_no": 1, **hats}
         return {"step": step, "study": study, "progress": {"at": 2, "of": 9}, "action": "/v/token", **more}
 
-    asked = {"questionnaire": QUESTIONNAIRE, "values": {}, "problems": {}}
+    asked = {"questionnaire": questionnaire(words), "values": {}, "problems": {}}
+    offered = [{"code": "en", "name": words, "url": "/s/demo?language=en"}]
     round_page = {
         "socket": "/v/token/play",
         "next": "/v/token",
         "minutes": 1.0,
         "round_no": 1,
         "of": 6,
-        "goal": {"score": 160, "text": HOSTILE},
+        "goal": {"score": 160, "text": words},
+        "bonus": {"amount": 0.5, "unit": words},
         "human_hat": "blue",
         "partner_hat": FIRST_HAT,
         "tutorial": False,
         "skippable": True,
     }
-    end = {"html": "<p>End</p>", "completion_code": HOSTILE, "redirect": "https://example.org/?a=1&b=2"}
+    end = {"html": "<p>1</p>", "completion_code": words, "redirect": LEAVING}
     return {
-        "landing.html": {"study": study, "minutes": 12, "action": "/s/demo/begin"},
+        "landing.html": {
+            "study": study,
+            "minutes": 12,
+            "action": "/s/demo/begin",
+            "language": "en",
+            "languages": [*offered, {"code": "zh", "name": words, "url": "/s/demo?language=zh"}],
+        },
         "studies.html": {"studies": [study]},
-        "plain.html": {"title": HOSTILE, "message": HOSTILE, "status": 404},
-        "consent.html": visit("consent", html="<p>Agree?</p>"),
-        "instructions.html": visit("instructions", html="<p>Cook.</p>"),
-        "questionnaire.html": visit("questionnaire", **asked),
+        "plain.html": {"title": words, "message": words, "status": 404},
+        "ending.html": {"study": study, "outcome": "declined", "code": words, "redirect": LEAVING},
+        "consent.html": visit("consent", html="<p>1</p>"),
+        "instructions.html": visit("instructions", html="<p>1</p>", **clock),
+        "break.html": visit("break", **clock),
+        "questionnaire.html": visit("questionnaire", **asked, **clock),
+        "quiz.html": visit("quiz", **asked, wrong={"one": words}, tries_left=2, html="<p>1</p>"),
         "comparison.html": visit(
             "comparison", **asked, first={"hat": FIRST_HAT}, second={"hat": SECOND_HAT}, human_hat="blue"
+        ),
+        "lobby.html": visit(
+            "round", seconds_left=70, waited_s=50, poll="/v/token/lobby", human_hat="blue", fallback="exit"
         ),
         "round.html": visit("round", **round_page),
         "debrief.html": visit("debrief", **end),
@@ -96,6 +109,9 @@ def contexts() -> dict[str, dict[str, Any]]:
 def render(name: str, **changes: Any) -> str:
     """A template with its context, some of it changed."""
     return templates(str(FRONTEND / "templates")).get_template(name).render(**(contexts()[name] | changes))
+
+
+VOID = ("meta", "link", "img", "input", "br", "hr", "path")
 
 
 class Page(HTMLParser):
@@ -110,11 +126,23 @@ class Page(HTMLParser):
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.tags.append((tag, {name: value or "" for name, value in attrs}))
-        self._open.append(tag)
+        if tag not in VOID:
+            self._open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag in self._open:
+            while self._open.pop() != tag:
+                pass
 
     def handle_data(self, data: str) -> None:
         if self._open:
             self.texts.append((self._open[-1], data))
+
+    @property
+    def scripts(self) -> list[str]:
+        """Files of the scripts that run; blocks of data do not."""
+        blocks = [attrs for attrs in self.all("script") if attrs.get("type") != "application/json"]
+        return [attrs["src"].removeprefix("/static/") for attrs in blocks]
 
     def all(self, tag: str, **wanted: str) -> list[dict[str, str]]:
         """The attributes of every such tag that has the wanted values."""

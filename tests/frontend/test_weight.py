@@ -28,8 +28,8 @@ def test_first_paint_without_drawings_is_light(name: str) -> None:
     files: set[Path] = set()
     for attrs in page.all("link", rel="stylesheet"):
         files.add(FRONTEND / attrs["href"].removeprefix("/static/"))
-    for attrs in page.all("script"):
-        _with_imports(FRONTEND / attrs["src"].removeprefix("/static/"), files)
+    for script in page.scripts:
+        _with_imports(FRONTEND / script, files)
     assert files
     assert len(html.encode()) + sum(file.stat().st_size for file in files) < FIRST_PAINT_BYTES
 
@@ -45,6 +45,6 @@ def test_code_stays_small_and_on_this_host(path: Path) -> None:
 def test_every_script_is_reached_from_a_page() -> None:
     reached: set[Path] = set()
     for name in contexts():
-        for attrs in Page(render(name)).all("script"):
-            _with_imports(FRONTEND / attrs["src"].removeprefix("/static/"), reached)
+        for script in Page(render(name)).scripts:
+            _with_imports(FRONTEND / script, reached)
     assert reached == set((FRONTEND / "js").glob("*.js"))
