@@ -176,7 +176,7 @@ def save_attempt(connection: Connection, visit_id: int, values: Mapping[str, Any
     if active(connection, visit_id) is None:
         return False
     new = insert_into(connection.engine, ATTEMPTS).values(visit_id=visit_id, **values)
-    if connection.execute(new.on_conflict_do_nothing()).rowcount == 0:
+    if connection.execute(new.on_conflict_do_nothing().returning(ATTEMPTS.c.attempt)).first() is None:
         return False
     changes = {"tries": values["attempt"], "last_seen_ms": values["at_ms"]}
     connection.execute(update(VISITS).where(VISITS.c.id == visit_id).values(**changes))

@@ -60,7 +60,8 @@ def stand_in(connection: Connection, round_id: int, values: Mapping[str, Any], l
     """Note that an agent took a person's seat, unless one did before."""
     must_hold(connection, lease)
     new = insert_into(connection.engine, STAND_INS).values(round_id=round_id, **values)
-    return connection.execute(new.on_conflict_do_nothing()).rowcount == 1
+    stored = new.on_conflict_do_nothing().returning(STAND_INS.c.seat)
+    return connection.execute(stored).first() is not None
 
 
 def must_hold(connection: Connection, lease: Lease | None) -> None:

@@ -230,3 +230,22 @@ class Health:
     waiting_rows: int
     lost_rows: int
     fenced_rows: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class ResearcherRow:
+    """An account for the researcher's pages."""
+
+    id: int
+    name: str
+    password_hash: str = field(repr=False)
+    created_ms: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class SessionRow:
+    """A researcher's login; `csrf` is the secret that each of its forms carries."""
+
+    researcher: ResearcherRow
+    csrf: str = field(repr=False)
+    expires_ms: int = 0
