@@ -36,7 +36,7 @@ bench: $(ALL) ## run every benchmark, one JSON object per figure
 verify: lint ## no time limit: lint, tests with long fuzzing, the whole demo study in Chromium, benchmarks
 	@sh tests/chromium.sh > /dev/null
 	@$(PY) tests/overcooked_package.py > /dev/null
-	CHROMIUM="$$(sh tests/chromium.sh)" $(PY) -m pytest -m "full or not full" --hypothesis-profile=long
+	CHROMIUM="$$(sh tests/chromium.sh)" $(PY) -m pytest -m "full or not full" --hypothesis-profile=long --timeout=7200
 	$(MAKE) bench
 
 # The first Python of these that fits; `make PYTHON=/path/to/python3.12` names another.
