@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from galley import __version__
-from galley.commands import agents, check, evaluate, export, init, learn, serve, trajectories
+from galley.commands import agents, check, evaluate, export, init, learn, researchers, serve, trajectories
 from galley.errors import GalleyError
 
 app = typer.Typer(
@@ -26,6 +26,7 @@ app.command()(evaluate.evaluate)
 app.add_typer(trajectories.app, name="trajectories")
 app.add_typer(agents.app, name="agents")
 app.add_typer(learn.app, name="learn")
+app.add_typer(researchers.app, name="researchers")
 
 
 def _print_version(wanted: bool) -> None:

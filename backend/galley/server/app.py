@@ -20,6 +20,7 @@ from galley.errors import GalleyError
 from galley.kitchen import Kitchen, Layout, warm
 from galley.kitchen.layout_file import load_layouts
 from galley.records import Store
+from galley.server.admin.pages import researcher_pages
 from galley.server.clock import Clock
 from galley.server.matches import Matches, round_layout
 from galley.server.origin import HEADERS, SecureHeaders
@@ -81,6 +82,16 @@ def create_app(workspace: Workspace, store: Store, settings: Settings) -> FastAP
 
     app = FastAPI(title="Galley", docs_url=None, redoc_url=None, openapi_url=None, lifespan=lifespan)
     app.include_router(pages.router())
+    app.include_router(
+        researcher_pages(
+            store=store,
+            database=settings.database or workspace.database,
+            studies=studies,
+            folder=str(frontend / "templates"),
+            clock=clock,
+            stop_visit=matches.stop_visit,
+        )
+    )
     app.add_api_websocket_route("/v/{token}/play", play.endpoint)
     app.mount("/static", Static(directory=frontend), name="static")
     app.add_middleware(SecureHeaders)

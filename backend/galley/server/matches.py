@@ -16,6 +16,7 @@ from galley.agents.catalogue import Catalogue
 from galley.agents.protocol import Agent
 from galley.kitchen import Kitchen, Layout
 from galley.records import RoundRow, Store
+from galley.server import wire
 from galley.server.clock import Clock, Stagger
 from galley.server.journal import RoundJournal
 from galley.server.match import Match, RoundSpec
@@ -102,6 +103,19 @@ class Matches:
         for _, match in tuple(self._live.values()):
             match.stop()
             await match.ended()
+
+    async def stop_visit(self, visit_id: int) -> None:
+        """Stop the match of a visit that is to be erased, if it has one; the round's end is not written."""
+        there = self._live.pop(visit_id, None)
+        if there is None:
+            return
+        match = there[1]
+        connection = match.connection
+        if connection is not None:
+            connection.close(wire.CLOSE_ENDED)
+            match.leave(connection)
+        match.stop()
+        await match.ended()
 
     # ---- setting up ----------------------------------------------------------------------------------------
 

@@ -40,9 +40,7 @@ class Desk:
         """What a function of `galley.records.overview` or `queries` finds."""
         return await asyncio.wrap_future(self.store.read(query))
 
-    def show(
-        self, session: SessionRow, template: str, status_code: int = 200, /, **values: Any
-    ) -> Response:
+    def show(self, session: SessionRow, template: str, status_code: int = 200, /, **values: Any) -> Response:
         """A page; `session` brings who is logged in and the token of its forms."""
         return HTMLResponse(self.part(session, template, **values), status_code, NEVER_CACHED)
 

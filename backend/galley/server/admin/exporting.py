@@ -1,7 +1,7 @@
 """Writes one export in a process of its own, so that no running round waits for it.
 
-Run as a module: reads one JSON object from standard input (`database`, `study`, `kind`, `tests`, `out`), writes
-the file `out`, and exits with 1 after one line on standard error when that cannot be done.
+Run as a module: reads one JSON object from standard input (`database`, `study`, `kind`, `tests`, `out`),
+writes the file `out`, and exits with 1 after one line on standard error when that cannot be done.
 """
 
 from __future__ import annotations

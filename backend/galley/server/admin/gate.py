@@ -165,7 +165,7 @@ class Gate:
     async def _login_form(
         self, request: Request, status: int, back: str, name: str = "", problem: str = ""
     ) -> Response:
-        anybody = bool(await asyncio.wrap_future(self._researchers.all()))
+        everybody: tuple[ResearcherRow, ...] = await asyncio.wrap_future(self._researchers.all())
         token = secrets.token_urlsafe(24)
         response = self._shown(
             "login.html",
@@ -175,7 +175,7 @@ class Gate:
             back=_inside(back),
             name=name,
             problem=problem,
-            anybody=anybody,
+            anybody=bool(everybody),
         )
         _set(response, request, FORM_COOKIE, token, 3600, LOGIN)
         return response
@@ -200,9 +200,7 @@ def _inside(path: str) -> str:
     return path if plain and (path == HOME or path.startswith((f"{HOME}/", f"{HOME}?"))) else HOME
 
 
-def _set(
-    response: Response, request: Request, name: str, value: str, seconds: int, path: str = HOME
-) -> None:
+def _set(response: Response, request: Request, name: str, value: str, seconds: int, path: str = HOME) -> None:
     response.set_cookie(
         name,
         value,

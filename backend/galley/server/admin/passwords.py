@@ -13,14 +13,15 @@ LONGEST_NAME = 100
 
 # 19 MiB, two passes: a login must not swell a serving process, nor keep a core from the rounds for long.
 # Source: OWASP Password Storage Cheat Sheet, Argon2id, the second of its equally strong settings.
-_HASHER = {"time_cost": 2, "memory_cost": 19 * 1024, "parallelism": 1}
+PASSES = 2
+MEMORY_KIB = 19 * 1024
 
 
 class Passwords:
     """Hashes passwords and checks them; both take tens of milliseconds on purpose."""
 
     def __init__(self) -> None:
-        self._hasher = PasswordHasher(**_HASHER)
+        self._hasher = PasswordHasher(time_cost=PASSES, memory_cost=MEMORY_KIB, parallelism=1)
         self._nobody = self._hasher.hash("nobody has this password")
 
     def hashed(self, password: str) -> str:

@@ -35,13 +35,11 @@ def episodes(layout: Layout, joint_actions: NDArray[np.uint8], count: int) -> tu
             return tuple(found)
 
 
-def replay_document(
-    row: RoundRow, ticks: Mapping[int, Mapping[str, Any]], after: int = 0
-) -> dict[str, Any]:
+def replay_document(row: RoundRow, ticks: Mapping[int, Mapping[str, Any]], after: int = 0) -> dict[str, Any]:
     """The round for its page: fixed facts, a keyframe per episode, and each tick from `after` on.
 
-    `ticks` are the stored rows by number. Keyframes and ticks are those of the play socket (docs/protocol.md);
-    beside each tick stand both actions and why the agent's was not its own, if so.
+    `ticks` are the stored rows by number. Keyframes and ticks are those of the play socket
+    (docs/protocol.md); beside each tick stand both actions and why the agent's was not its own, if so.
     """
     layout = Layout.from_dict(json.loads(row.layout_json))
     scene = Scene(layout)

@@ -14,7 +14,7 @@ from galley.records.tables import STUDY_STATES, VISIT_STATUSES
 from galley.server.admin.desk import Desk, link
 from galley.server.admin.downloads import DOWNLOADS
 from galley.server.admin.gate import HOME, NEVER_CACHED, Form, first
-from galley.server.admin.tallies import flag_tallies, study_rows
+from galley.server.admin.tallies import cell_rows, flag_tallies, study_rows
 from galley.study.assignment import capacity
 
 VISITS_A_PAGE = 50
@@ -56,7 +56,9 @@ class StudyPages:
             query = "&".join(f"{key}={{{{%{key}%}}}}" for key in kept)
             links.append(("With a recruiter's parameters", f"{request.base_url}s/{name}?{query}"))
         title = name if study is None else study.title
-        return self._desk.show(session, "study.html", name=name, title=title, links=links, downloads=DOWNLOADS, **state)
+        return self._desk.show(
+            session, "study.html", name=name, title=title, links=links, downloads=DOWNLOADS, **state
+        )
 
     async def study_live(self, request: Request, session: SessionRow) -> Response:
         """The numbers of that page, as they are now."""
@@ -83,10 +85,14 @@ class StudyPages:
             }
 
         state = await self._desk.read(read)
-        row = next((row for row in study_rows(state.pop("rows"), self._desk.studies) if row["name"] == name), None)
+        row = next(
+            (row for row in study_rows(state.pop("rows"), self._desk.studies) if row["name"] == name), None
+        )
         study = self._desk.studies.get(name)
         room = None if study is None else capacity(study)
-        return None if row is None else state | {"row": row, "capacity": room}
+        if row is None:
+            return None
+        return state | {"row": row, "capacity": room, "cells": cell_rows(state["cells"], study)}
 
     async def set_state(self, request: Request, session: SessionRow, form: Form) -> Response:
         """Open, pause or close a study; visits that are under way go on."""

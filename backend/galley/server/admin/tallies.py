@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from galley.study.assignment import cells
 from galley.study.study import Study
 
 UNDER_WAY = "active"
@@ -25,7 +26,14 @@ def study_rows(found: Iterable[Any], served: Mapping[str, Study]) -> list[dict[s
 
 
 def _row(
-    name: str, title: str, state: str, by_status: Mapping[str, int], tests: int, open_rounds: int, *, served: bool
+    name: str,
+    title: str,
+    state: str,
+    by_status: Mapping[str, int],
+    tests: int,
+    open_rounds: int,
+    *,
+    served: bool,
 ) -> dict[str, Any]:
     begun = sum(by_status.values())
     return {
@@ -43,10 +51,28 @@ def _row(
     }
 
 
+def cell_rows(found: Iterable[Any], study: Study | None) -> list[dict[str, Any]]:
+    """One row per cell of the design with its slots (CellCount), those nobody came to included.
+
+    `quota` is the number of completions that close the cell, None without one.
+    """
+    quota = None if study is None else study.config.quota
+    rows = [
+        {"cell": row.cell, "completed": row.completed, "held": row.held, "waiting": row.free, "quota": quota}
+        for row in found
+    ]
+    for cell in () if study is None else cells(study.config):
+        if not any(row["cell"] == cell for row in rows):
+            rows.append({"cell": dict(cell), "completed": 0, "held": 0, "waiting": 0, "quota": quota})
+    return rows
+
+
 def flag_tallies(flags: Mapping[int, Iterable[Any]]) -> list[dict[str, Any]]:
     """One row per kind of flag with how many visits have it, most first; `flags` are Flags by visit."""
     kinds: dict[str, int] = {}
     for of_visit in flags.values():
         for kind in {flag.kind for flag in of_visit}:
             kinds[kind] = kinds.get(kind, 0) + 1
-    return [{"kind": kind, "visits": count} for kind, count in sorted(kinds.items(), key=lambda pair: -pair[1])]
+    return [
+        {"kind": kind, "visits": count} for kind, count in sorted(kinds.items(), key=lambda pair: -pair[1])
+    ]

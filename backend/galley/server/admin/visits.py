@@ -16,6 +16,7 @@ from galley.server.admin.desk import Desk, number
 from galley.server.admin.gate import HOME, NEVER_CACHED, Form, first
 
 LONGEST_NOTE = 4000
+MOST_ROUNDS = 1000
 
 
 class VisitPages:
@@ -49,12 +50,15 @@ class VisitPages:
         if first(form, "confirm").strip() != found.participant:
             problem = f"Nothing was erased. To erase this participant, type {found.participant} exactly."
             return await self._page(visit_id, session, 422, erase_problem=problem)
+        store, now_ms = self._desk.store, self._desk.clock.ms()
+        # A visit that is over cannot take up its round again between the match's end and the erasing.
+        await asyncio.wrap_future(store.end_visit(visit_id, "expired", now_ms))
         await self._desk.stop_visit(visit_id)
         try:
-            erased = await asyncio.to_thread(erase_participant, self._desk.store, found.participant)
+            erased = await asyncio.to_thread(erase_participant, store, found.participant)
         except GalleyError as error:
             return self._desk.gate.plain(session, 409, "Not erased", f"{error}.")
-        told = f"{erased.visits} visit(s) and {erased.rounds} round(s) of {found.participant} were erased for good."
+        told = f"{found.participant} was erased for good: visits {erased.visits}, rounds {erased.rounds}."
         return self._desk.gate.plain(session, 200, "Erased", told)
 
     async def _found(self, visit_id: int) -> Any:
@@ -74,12 +78,13 @@ class VisitPages:
             visit = overview.visit(connection, visit_id)
             if visit is None:
                 return None
+            rounds = overview.rounds(connection, visit.study, visit_id=visit_id, limit=MOST_ROUNDS, offset=0)
             return {
                 "visit": visit,
                 "study": visit.study,
                 "timeline": overview.timeline(connection, visit_id),
                 "answers": overview.answers(connection, visit_id),
-                "rounds": overview.rounds(connection, visit.study, visit_id=visit_id, limit=1000, offset=0),
+                "rounds": sorted(rounds, key=lambda round_: round_.id),
                 "notes": overview.notes(connection, visit_id),
             }
 
