@@ -2,88 +2,15 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Callable, Iterator
 
 import pytest
-from playwright.sync_api import Browser, Page, Route, WebSocketRoute, expect
+from playwright.sync_api import Browser, Page, expect
 
-from tests.frontend.pages import FRONTEND, render
+from tests.browser.played import HOST, KEYFRAME, Server, tick
+from tests.frontend.pages import render
 
-HOST = "http://galley.test"
-TYPES = {".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
-STRICT = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'"
-KEYFRAME: dict[str, Any] = {
-    "type": "keyframe",
-    "phase": "waiting",
-    "tick": 0,
-    "horizon": 400,
-    "tick_ms": 150,
-    "seat": 0,
-    "hats": ["blue", "orange"],
-    "grid": ["XXPXX", "O   O", "X   X", "XDXSX"],
-    "cook_time": 20,
-    "chefs": [[1, 2, 0, 0], [3, 1, 0, 0]],
-    "things": [],
-    "pots": [[2, 0, 0, 0, 0, False]],
-    "score": 0,
-    "goal": 40,
-    "round": 1,
-    "of": 6,
-    "tutorial": False,
-    "orders": None,
-}
-
-
-def tick(number: int, **changes: Any) -> dict[str, Any]:
-    """A tick message in which nothing happens but what is named."""
-    still = {"chefs": KEYFRAME["chefs"], "things": [], "pots": [], "score": 0, "events": []}
-    return {"type": "tick", "tick": number, **still, **changes}
-
-
-class Server:
-    """Answers the page's sockets and keeps what they say."""
-
-    def __init__(self, page: Page) -> None:
-        self.page = page
-        self.sockets: list[WebSocketRoute] = []
-        self.heard: list[dict[str, Any]] = []
-        page.route_web_socket("**/v/token/play", self._accept)
-        page.route(f"{HOST}/**", self._serve)
-
-    def _accept(self, socket: WebSocketRoute) -> None:
-        self.sockets.append(socket)
-        socket.on_message(lambda text: self.heard.append(json.loads(text)))
-
-    def _serve(self, route: Route) -> None:
-        path = route.request.url.removeprefix(HOST)
-        if path.startswith("/static/"):
-            file = FRONTEND / path.removeprefix("/static/")
-            route.fulfill(body=file.read_bytes(), content_type=TYPES[file.suffix])
-        elif path == "/round":
-            headers = {"content-security-policy": STRICT, "content-type": "text/html"}
-            route.fulfill(body=render("round.html", skippable=False), headers=headers)
-        else:
-            route.fulfill(body=f"<h1>{path}</h1>", content_type="text/html")
-
-    def say(self, *messages: dict[str, Any]) -> None:
-        """Send messages on the newest socket."""
-        for message in messages:
-            self.sockets[-1].send(json.dumps(message))
-
-    def wait_for(self, kind: str, many: int = 1) -> list[dict[str, Any]]:
-        """Everything of a kind once there is so much of it; pings aside, the page says nothing unasked."""
-        for _ in range(200):
-            found = [message for message in self.heard if message["type"] == kind]
-            if len(found) >= many:
-                return found
-            self.page.wait_for_timeout(25)
-        raise AssertionError(f"no {many} of {kind} in {self.heard}")
-
-    def keys(self) -> list[tuple[str, bool]]:
-        """Key messages so far, as (key, down)."""
-        return [(message["key"], message["down"]) for message in self.heard if message["type"] == "key"]
+PAGES: dict[str, Callable[[], str]] = {"/round": lambda: render("round.html", skippable=False, bonus=None)}
 
 
 @pytest.fixture
@@ -100,7 +27,7 @@ def page(browser: Browser) -> Iterator[Page]:
 
 @pytest.fixture
 def server(page: Page) -> Server:
-    played = Server(page)
+    played = Server(page, PAGES)
     page.goto(f"{HOST}/round")
     assert played.wait_for("hello")[0]["protocol"] == 1
     played.say(KEYFRAME)
@@ -173,7 +100,7 @@ def test_what_moves_is_drawn_between_ticks(server: Server, page: Page) -> None:
 
 def test_the_kitchen_is_sharp_on_a_dense_display(browser: Browser) -> None:
     context = browser.new_context(viewport={"width": 500, "height": 700}, device_scale_factor=3)
-    server = Server(context.new_page())
+    server = Server(context.new_page(), PAGES)
     server.page.goto(f"{HOST}/round")
     server.wait_for("hello")
     server.say(KEYFRAME)
@@ -215,7 +142,9 @@ def test_an_older_tab_says_so_and_stays_away(server: Server, page: Page) -> None
 def test_the_end_leads_on_but_not_by_a_key_still_pressed(server: Server, page: Page) -> None:
     playing(server)
     server.say(tick(400, score=20), {"type": "ended", "outcome": "finished", "score": 20, "next": "/v/token"})
-    expect(page.locator("[data-part=card-text]")).to_contain_text("1 soup: 20 points")
+    expect(page.locator("[data-part=card-text]")).to_have_text(
+        "Soups served: 1. Points: 20. The goal was 40."
+    )
     page.keyboard.press("Space")
     page.wait_for_timeout(100)
     assert page.url == f"{HOST}/round"
