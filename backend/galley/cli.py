@@ -8,7 +8,18 @@ from typing import Annotated
 import typer
 
 from galley import __version__
-from galley.commands import agents, check, evaluate, export, init, learn, researchers, serve, trajectories
+from galley.commands import (
+    agents,
+    check,
+    evaluate,
+    export,
+    init,
+    learn,
+    researchers,
+    serve,
+    studies,
+    trajectories,
+)
 from galley.errors import GalleyError
 
 app = typer.Typer(
@@ -25,6 +36,7 @@ app.command()(export.export)
 app.command()(evaluate.evaluate)
 app.add_typer(trajectories.app, name="trajectories")
 app.add_typer(agents.app, name="agents")
+app.add_typer(studies.app, name="studies")
 app.add_typer(learn.app, name="learn")
 app.add_typer(researchers.app, name="researchers")
 

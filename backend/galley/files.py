@@ -28,7 +28,9 @@ Loc = tuple[str | int, ...]
 class FileModel(pydantic.BaseModel):
     """Base of everything read from a file: unknown keys are refused and values never change."""
 
-    model_config = pydantic.ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = pydantic.ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True
+    )
 
 
 M = TypeVar("M", bound=FileModel)

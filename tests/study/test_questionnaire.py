@@ -164,7 +164,8 @@ def test_the_questionnaires_of_the_paper_ask_what_it_asks() -> None:
     assert [(item.kind, item.scale, len(item.labels)) for item in comparison] == [("comparison", 7, 7)] * 3
     assert comparison[0].labels[0] == "strongly prefer the first"
     assert comparison[0].labels[3] == "no preference"
-    assert all("COLE paper" in questionnaire.source for questionnaire in read.values())
+    of_the_paper = ("before-game", "after-round", "comparison")
+    assert all("COLE paper" in read[name].source for name in of_the_paper)
     assert all("Hoffman (2019)" in read[name].source for name in ("after-round", "comparison"))
 
 

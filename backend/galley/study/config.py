@@ -49,28 +49,51 @@ class StudyFile(FileModel):
     """A study file. Times are in ticks of `tick_ms` milliseconds or in seconds, as their names say."""
 
     format: Literal[1]
+    """Version of this kind of file."""
     title: Text
+    """What participants see first."""
     about: Words = ""
+    """One line under the title."""
     languages: tuple[LanguageCode, ...] = Field(("en",), min_length=1, max_length=20)
+    """Codes of the languages that participants may choose from; the first is the study's own."""
     seed: int = Field(ge=0, lt=2**63)
+    """A whole number; all that is drawn follows from it."""
     minutes: int | None = Field(None, ge=1, le=600)
+    """How long a visit takes, as told to participants; estimated without it."""
     tick_ms: TickMs = 150
+    """Milliseconds per tick."""
     horizon_ticks: Ticks = 400
+    """Ticks of an episode: 400 of 150 ms are one minute."""
     input_mode: InputMode = "hold"
+    """A held key acts at every tick, or every press of a key is one action."""
     countdown_s: Annotated[int, Field(ge=0, le=30)] = 3
+    """Seconds between Start and the first tick."""
     abandon_after_s: Annotated[int, Field(ge=1, le=3600)] = 60
+    """Seconds after which a round that its participant left ends as abandoned."""
     visit_limit_min: int | None = Field(None, ge=1, le=10_000)
+    """Minutes after which a visit ends as timed_out."""
     hats: tuple[Hat, ...] = HATS
+    """The hat colours to give out."""
     hat_order: Order = "random"
+    """How hats are given: see Balance."""
     bonus_unit: Annotated[str, Field(max_length=20)] = ""
+    """The unit of bonuses, such as CNY."""
     factors: dict[FactorName, Factor] = Field(default_factory=dict)
+    """What differs between participants, by name: see Balance."""
     quota: int | None = Field(None, ge=1, le=100_000)
+    """Completed visits wanted in each cell; then the study closes."""
     slot_expires_min: int = Field(60, ge=1, le=100_000)
+    """Minutes without a sign of life after which a visit's slot may be given to someone else."""
     attention: Attention = Attention()
+    """What failed attention checks lead to."""
     recruitment: Recruitment = Recruitment()
+    """Where participants come from."""
     completion: Completion
+    """What those who reach the end take away."""
     endings: Endings = Endings()
+    """What those take away who do not."""
     stages: tuple[Stage, ...] = Field(min_length=2)
+    """The stages in order; consent first, debrief last."""
 
     @field_validator("hats")
     @classmethod

@@ -210,7 +210,7 @@ def _spreads(things: int, places: int) -> int:
     """In how many ways places can be shared out evenly among things."""
     each, more = divmod(places, things)
     same = math.factorial(each) ** (things - more) * math.factorial(each + 1) ** more
-    return math.comb(things, more) * math.factorial(places) // same
+    return int(math.comb(things, more) * math.factorial(places) // same)
 
 
 def _rules(stage: Stage) -> Iterator[str]:

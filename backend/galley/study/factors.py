@@ -49,7 +49,9 @@ class Factor(FileModel):
     """
 
     levels: tuple[Level, ...] = Field(min_length=2, max_length=100)
+    """The values it takes, such as names of agents; numbers in quotes."""
     assign: Literal["full", "random", "latin_square", "fixed"] = "full"
+    """How participants get a level: see Balance."""
 
     @field_validator("levels")
     @classmethod
@@ -80,11 +82,17 @@ class Condition(FileModel):
     """
 
     item: Annotated[str, Field(pattern=r"^[a-z][a-z0-9-]*\.[a-z][a-z0-9_]*$")] | None = None
+    """`stage.item`: the id of a stage with questions before this one, and of one of its items."""
     factor: FactorName | None = None
+    """The name of a factor, instead of an item."""
     any_of: tuple[str | int | float, ...] = ()
+    """One of these is the answer, or among several answers."""
     none_of: tuple[str | int | float, ...] = ()
+    """None of these is."""
     at_least: float | None = None
+    """The answer is a number, and at least this."""
     at_most: float | None = None
+    """The answer is a number, and at most this."""
 
     @model_validator(mode="after")
     def _asks_one_thing(self) -> Self:
@@ -118,5 +126,7 @@ def _as_list(value: Any) -> Any:
     return [value] if isinstance(value, dict) else value
 
 
-Conditions = Annotated[tuple[Condition, ...], BeforeValidator(_as_list, json_schema_input_type=Any)]
+Conditions = Annotated[
+    tuple[Condition, ...], BeforeValidator(_as_list, json_schema_input_type=Condition | tuple[Condition, ...])
+]
 """One condition, or a list of them that must all hold."""

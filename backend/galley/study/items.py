@@ -19,31 +19,46 @@ class When(FileModel):
     """The item is asked only if the earlier choice `item` was answered with one of `any_of`."""
 
     item: str
+    """The id of a single or multiple choice item above this one."""
     any_of: tuple[str, ...] = Field(min_length=1)
+    """Values of its options; one of them has to be chosen."""
 
 
 class Option(FileModel):
     """One answer to choose: the value that is stored and the words that are shown."""
 
     value: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=40)]
+    """What is stored: lower-case letters, digits, - and _."""
     label: Text
+    """What is shown."""
 
 
 class _Item(FileModel):
     id: ItemId
+    """Names the answer in the exports: lower-case letters, digits and _."""
     text: Text
+    """The question or statement."""
     help: Words = ""
+    """A line below it, in smaller type."""
     required: bool = True
+    """Whether it has to be answered."""
     when: When | None = None
+    """Asks it only after a certain answer to an earlier choice item."""
     hint: Words = ""
+    """Shown beside it when a quiz is answered wrongly."""
     subscale: Annotated[str, Field(pattern=r"^[a-z0-9_-]*$", max_length=40)] = ""
+    """The name under which answers to several items are averaged."""
 
 
 class _Scale(_Item):
     scale: int = Field(7, ge=2, le=101)
+    """How many points the scale has."""
     low_label: Text
+    """The words at the low end, point 1."""
     high_label: Text
+    """The words at the high end."""
     labels: tuple[Words, ...] = ()
+    """Words for every point, or none."""
 
     @model_validator(mode="after")
     def _one_label_per_point(self) -> Self:
@@ -55,7 +70,9 @@ class _Scale(_Item):
 
 class _Rating(_Scale):
     reversed: bool = False
+    """Whether a high point counts as low in its subscale."""
     expected: int | None = None
+    """The right point: makes the item an attention check, or a question of a quiz."""
 
     @model_validator(mode="after")
     def _expected_is_on_the_scale(self) -> Self:
@@ -69,6 +86,7 @@ class Likert(_Rating):
 
     kind: Literal["likert"]
     style: Literal["radio", "stars"] = "radio"
+    """Round buttons or stars."""
 
 
 class SemanticDifferential(_Rating):
@@ -85,6 +103,7 @@ class Comparison(_Scale):
 
 class _Choice(_Item):
     options: tuple[Option, ...] = Field(min_length=2, max_length=50)
+    """The answers to choose from."""
 
     @model_validator(mode="after")
     def _values_differ(self) -> Self:
@@ -111,6 +130,7 @@ class SingleChoice(_Choice):
 
     kind: Literal["single_choice"]
     expected: str | None = None
+    """The value of the right option: makes the item an attention check, or a question of a quiz."""
 
     @model_validator(mode="after")
     def _expected_is_an_option(self) -> Self:
@@ -123,6 +143,7 @@ class MultipleChoice(_Choice):
 
     kind: Literal["multiple_choice"]
     expected: tuple[str, ...] | None = Field(None, min_length=1)
+    """The values of exactly the right options: makes it a check, or a question of a quiz."""
 
     @model_validator(mode="after")
     def _expected_are_options(self) -> Self:
@@ -135,13 +156,18 @@ class Ranking(_Choice):
 
     kind: Literal["ranking"]
     options: tuple[Option, ...] = Field(min_length=2, max_length=20)
+    """What is put in order."""
 
 
 class _Amount(_Item):
     min: float
+    """The smallest answer."""
     max: float
+    """The largest answer."""
     unit: Words = ""
+    """Shown behind the answer."""
     expected: float | None = None
+    """The right answer: makes the item an attention check, or a question of a quiz."""
 
     @model_validator(mode="after")
     def _range_is_not_empty(self) -> Self:
@@ -159,6 +185,7 @@ class Number(_Amount):
 
     kind: Literal["number"]
     whole: bool = True
+    """Whether only whole numbers are answers."""
 
 
 class Slider(_Amount):
@@ -166,12 +193,19 @@ class Slider(_Amount):
 
     kind: Literal["slider"]
     min: float = 0
+    """The answer at the low end."""
     max: float = 100
+    """The answer at the high end."""
     step: float = Field(1, gt=0)
+    """How far apart the answers lie; NASA-TLX has 0 to 100 in steps of 5."""
     low_label: Text
+    """The words at the low end."""
     high_label: Text
+    """The words at the high end."""
     show_value: bool = False
+    """Whether the number is shown."""
     reversed: bool = False
+    """Whether a high answer counts as low in its subscale."""
 
     @model_validator(mode="after")
     def _steps_fill_the_line(self) -> Self:
@@ -187,6 +221,7 @@ class ShortText(_Item):
 
     kind: Literal["short_text"]
     max_length: int = Field(200, ge=1, le=1000)
+    """The most characters."""
 
 
 class LongText(_Item):
@@ -194,6 +229,7 @@ class LongText(_Item):
 
     kind: Literal["long_text"]
     max_length: int = Field(5000, ge=1, le=20000)
+    """The most characters."""
 
 
 Item = Annotated[

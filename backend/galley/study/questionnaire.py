@@ -40,11 +40,17 @@ class Questionnaire(FileModel):
     """A questionnaire file: its title and items in order, and where they come from."""
 
     format: Literal[1]
+    """Version of this kind of file."""
     title: Text
+    """The heading of its page."""
     source: Text
+    """Where its items come from."""
     intro: Words = ""
+    """Words above the items."""
     order: Literal["fixed", "random"] = "fixed"
+    """Items as written, or shuffled for each visit; an item with `when` stays behind the one it asks for."""
     items: tuple[Item, ...] = Field(min_length=1, max_length=300)
+    """The items, see below."""
 
     @field_validator("items")
     @classmethod

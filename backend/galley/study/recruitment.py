@@ -51,42 +51,59 @@ class Completion(FileModel):
     """What a participant who reached the end takes away: a code, and perhaps an address to go to."""
 
     code: Code
+    """Shown at the end."""
     redirect: Redirect | None = None
+    """An https address to go on to; `{code}` and kept parameters such as `{PROLIFIC_PID}` are filled in."""
 
 
 class EndingFile(FileModel):
     """What a participant meets who did not reach the end: a text, a code, an address to go to."""
 
     text: TextName | None = None
+    """The page that is shown; a plain one of ours without it."""
     code: Code | None = None
+    """A code to hand in."""
     redirect: Redirect | None = None
+    """An https address to go on to, as for `completion`."""
 
 
 class Endings(FileModel):
     """How visits end that do not reach the debrief, by outcome; what is left out has a plain page."""
 
     declined: EndingFile = EndingFile()
+    """The participant did not agree."""
     screened_out: EndingFile = EndingFile()
+    """A `screen_out` stage met its condition."""
     failed_checks: EndingFile = EndingFile()
+    """Too many attention checks failed, or a quiz."""
     timed_out: EndingFile = EndingFile()
+    """A time limit that ends the visit has passed."""
     expired: EndingFile = EndingFile()
+    """The visit was away too long and its slot was given to someone else."""
     partner_missing: EndingFile = EndingFile()
+    """Nobody came to play with."""
 
 
 class Attention(FileModel):
     """What follows when more than `allowed` attention checks of a visit are failed."""
 
     allowed: int = Field(0, ge=0, le=100)
+    """How many attention checks of a visit may be failed."""
     then: Literal["flag", "end"] = "flag"
+    """What follows when more are: the visit is marked for the researcher, or ends as failed_checks."""
 
 
 class Recruitment(FileModel):
     """Which parameters of the link are kept, which of them tells a person apart, and who is invited."""
 
     keep: tuple[ParamName, ...] = Field(PLATFORM_PARAMS, max_length=20)
+    """Parameters of the study's link that are stored; all others are dropped."""
     participant: ParamName | None = None
+    """Which of them tells a person apart, for instance `PROLIFIC_PID`."""
     once: bool = True
+    """Whether a person has one visit only; coming back leads to it."""
     invitations: Annotated[str, known_name("list of invitations", "invitations")] | None = None
+    """A file `invitations/NAME.txt` of codes, one a line: only links with `?code=...` may begin."""
 
     @model_validator(mode="after")
     def _the_person_is_kept(self) -> Self:

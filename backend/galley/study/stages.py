@@ -35,18 +35,25 @@ InputMode = Literal["hold", "press"]
 
 class _Named(FileModel):
     id: StageId | None = None
+    """Names the stage in exports and conditions; its kind (and a number) without it."""
     title: Words = ""
+    """The heading of its page, instead of its own."""
 
 
 class _Stage(_Named):
     when: Conditions = ()
+    """One condition or a list of conditions that must all hold, else the stage is left out."""
 
 
 class _Page(_Stage):
     skippable: bool = False
+    """Whether the participant may leave it out."""
     time_limit_s: Seconds | None = None
+    """Seconds until it is over."""
     at_limit: Literal["go_on", "end"] = "go_on"
+    """What follows then: the next stage, or the end as timed_out."""
     at_least_s: int = Field(0, ge=0, le=3600)
+    """Seconds before the participant may go on."""
 
     @model_validator(mode="after")
     def _can_be_left_in_time(self) -> Self:
@@ -61,6 +68,7 @@ class Consent(_Named):
 
     kind: Literal["consent"]
     text: TextName
+    """A text of questionnaires/texts/; the hash of the exact words agreed to is stored."""
 
 
 class Questions(_Page):
@@ -68,6 +76,7 @@ class Questions(_Page):
 
     kind: Literal["questionnaire"]
     questionnaire: QuestionnaireName
+    """A file of questionnaires/."""
 
 
 class Instructions(_Page):
@@ -75,6 +84,7 @@ class Instructions(_Page):
 
     kind: Literal["instructions"]
     text: TextName
+    """A text of questionnaires/texts/."""
 
 
 class Quiz(_Page):
@@ -82,10 +92,15 @@ class Quiz(_Page):
 
     kind: Literal["quiz"]
     questionnaire: QuestionnaireName
+    """A file of questionnaires/; its items with `expected` have to be answered right."""
     tries: int = Field(3, ge=1, le=100)
+    """How often it may be answered."""
     after_last: Literal["end", "go_on"] = "end"
+    """What follows when the last try is wrong: the end as failed_checks, or the next stage."""
     text: TextName | None = None
+    """A text to look at again beside the questions."""
     skippable: Literal[False] = False
+    """A quiz may not be left out."""
 
 
 class Break(_Page):
@@ -93,6 +108,7 @@ class Break(_Page):
 
     kind: Literal["break"]
     text: TextName | None = None
+    """A text to show; a plain page of ours without it."""
 
 
 class ScreenOut(_Stage):
@@ -100,6 +116,7 @@ class ScreenOut(_Stage):
 
     kind: Literal["screen_out"]
     when: Conditions = Field(min_length=1)
+    """Whom the visit ends for."""
 
 
 class Tutorial(_Stage):
@@ -107,14 +124,23 @@ class Tutorial(_Stage):
 
     kind: Literal["tutorial"]
     layout: LayoutName
+    """The kitchen."""
     agent: Annotated[str, known_name("agent", "agents", ALONE)]
+    """The partner; `stay` stands still, `none` is not seen and needs a kitchen such as practice_alone."""
     seat: Literal["random", 0, 1] = "random"
+    """The participant's seat."""
     horizon_ticks: Ticks | None = None
+    """Ticks of an episode, instead of the study's."""
     tick_ms: TickMs | None = None
+    """Milliseconds per tick, instead of the study's."""
     episodes: int = Field(1, ge=1, le=50)
+    """How many episodes the round has, each from a fresh kitchen."""
     input_mode: InputMode | None = None
+    """How keys act, instead of the study's."""
     show_score: Literal["during", "after", "never"] = "during"
+    """When the score is shown."""
     skippable: bool = False
+    """Whether the participant may leave it out."""
 
     @model_validator(mode="after")
     def _alone_on_a_known_seat(self) -> Self:
@@ -128,10 +154,15 @@ class Kitchen(FileModel):
     """One layout of a rounds stage, the score to aim for there, and what differs from the other rounds."""
 
     layout: LayoutName
+    """Name or alias of a layout."""
     goal: int | None = Field(None, ge=1, le=100_000)
+    """The score to aim for, over all episodes."""
     bonus: float | None = Field(None, gt=0, le=100_000)
+    """What reaching the goal earns, in `bonus_unit`."""
     horizon_ticks: Ticks | None = None
+    """Ticks of an episode on this layout."""
     tick_ms: TickMs | None = None
+    """Milliseconds per tick on this layout."""
 
     @model_validator(mode="after")
     def _a_bonus_needs_a_goal(self) -> Self:
@@ -148,8 +179,12 @@ class Lobby(FileModel):
     """
 
     wait_s: Seconds = 120
+    """Seconds to wait for another participant."""
     fallback: Annotated[str, known_name("agent", "agents", "exit", "go_on")] = "exit"
+    """What follows then: `exit` ends the visit as partner_missing, `go_on` leaves the round out, an agent
+    plays instead."""
     dropout: Annotated[str, known_name("agent", "agents", "end_round")] = "end_round"
+    """What follows when the other one leaves for good: the round ends, or an agent takes over."""
 
     @property
     def agents(self) -> tuple[tuple[str, str], ...]:
@@ -171,22 +206,39 @@ class Rounds(_Stage):
 
     kind: Literal["rounds"]
     agents: tuple[PartnerName, ...] = Field(min_length=1, max_length=20)
+    """The partners; `human` is another participant."""
     layouts: tuple[Kitchen, ...] = Field(min_length=1, max_length=100)
+    """The kitchens, one line each."""
     blocks: Literal["layout", "agent"] = "layout"
+    """All agents on a layout before the next layout, or all layouts with an agent before the next agent."""
     pairs: Literal["all", "random", "fixed", "latin_square", "full"] = "all"
+    """Every agent on every layout, or each layout once with one of the agents: see Balance."""
     layout_order: Order = "fixed"
+    """The order of the layouts: see Balance."""
     agent_order: Order = "random"
+    """The order of the agents: see Balance."""
     seats: Literal["per_layout", "per_round", 0, 1] = "per_layout"
+    """What the participant's seat belongs to: a layout, a round, or always the same one."""
     seat_order: Order = "random"
+    """How seats are given: see Balance."""
     horizon_ticks: Ticks | None = None
+    """Ticks of an episode, instead of the study's."""
     tick_ms: TickMs | None = None
+    """Milliseconds per tick, instead of the study's."""
     episodes: int = Field(1, ge=1, le=50)
+    """How many episodes a round has, each from a fresh kitchen; the score adds up."""
     input_mode: InputMode | None = None
+    """How keys act, instead of the study's."""
     show_score: Literal["during", "after", "never"] = "during"
+    """When the score is shown."""
     after_each: QuestionnaireName | None = None
+    """A questionnaire after each round."""
     goal_text: Words = ""
+    """The line that tells the goal, with `{goal}` and `{bonus}` in it; ours without it."""
     lobby: Lobby | None = None
+    """How `human` partners find each other."""
     skippable: bool = False
+    """Whether the participant may leave rounds out."""
 
     @property
     def count(self) -> int:
@@ -266,7 +318,9 @@ class Comparison(_Page):
 
     kind: Literal["comparison"]
     questionnaire: QuestionnaireName
+    """A file of questionnaires/ with items of kind comparison."""
     agents: tuple[PartnerName, PartnerName] | None = None
+    """The two partners, of those met; needed unless there were exactly two."""
 
 
 class Debrief(_Named):
@@ -274,6 +328,7 @@ class Debrief(_Named):
 
     kind: Literal["debrief"]
     text: TextName
+    """A text of questionnaires/texts/, shown with the completion code."""
 
 
 Stage = Annotated[
