@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 
 from galley.agents.choosing import choose
 from galley.errors import GalleyError
-from galley.kitchen import Encoder, Layout
+from galley.kitchen import ACTIONS, Encoder, Layout
 from galley.randomness import uniform
 
 Sampling = Literal["sample", "argmax"]
 
+ACTION_COUNT = len(ACTIONS)
 _WORD = (1 << 64) - 1
 
 
@@ -63,7 +64,8 @@ class Network:
         """Logits float32 [B, 6], and for recurrent policies the next states float32 [B, ...].
 
         Raises:
-            GalleyError: the network gives another shape, or numbers that are not finite.
+            GalleyError: the network gives another shape, or numbers that are not finite (told for the batch
+                as a whole: ask rows one by one to learn which).
         """
         feed = {"observation": observations}
         if states is not None:
@@ -73,7 +75,7 @@ class Network:
         except Exception as error:  # as above
             raise GalleyError(f"{self.path.name}: the network cannot be run ({_first_line(error)})") from None
         logits = np.asarray(found[0])
-        wanted = (len(observations), 6)
+        wanted = (len(observations), ACTION_COUNT)
         if logits.shape != wanted:
             raise GalleyError(
                 f"{self.path.name}: for {len(observations)} observations the output 'logits' has shape "
@@ -81,45 +83,42 @@ class Network:
             )
         if not np.isfinite(logits).all():
             raise GalleyError(f"{self.path.name}: the logits hold NaN or infinite numbers")
-        return logits, (np.asarray(found[1]) if self.recurrent else None)
+        if not self.recurrent:
+            return logits, None
+        following = np.asarray(found[1])
+        if not np.isfinite(following).all():
+            raise GalleyError(f"{self.path.name}: 'state_out' holds NaN or infinite numbers")
+        return logits, following
 
     def _check(self) -> tuple[int, ...] | None:
+        """The shape of the state of a recurrent policy, without batch; None for others."""
         inputs = {one.name: one for one in self._session.get_inputs()}
         outputs = {one.name: one for one in self._session.get_outputs()}
         recurrent = "state_in" in inputs or "state_out" in outputs
-        for kind, found, names in (
-            ("input", inputs, ["observation"] + ["state_in"] * recurrent),
-            ("output", outputs, ["logits"] + ["state_out"] * recurrent),
+        told = []
+        for kind, found, shapes in (
+            ("input", inputs, {"observation": self.shape}),
+            ("output", outputs, {"logits": (ACTION_COUNT,)}),
         ):
+            names = [*shapes, "state_in" if kind == "input" else "state_out"][: 1 + recurrent]
             if set(found) != set(names):
-                raise GalleyError(f"the {kind}s are {sorted(found)}, not {sorted(names)}")
+                told.append(f"the {kind}s are {sorted(found)}, not {sorted(names)}")
+                continue
             for name in names:
                 if found[name].type != "tensor(float)":
-                    raise GalleyError(f"{kind} '{name}' is {found[name].type}, not tensor(float)")
-        self._fit("input 'observation'", inputs["observation"].shape, self.shape)
-        self._fit("output 'logits'", outputs["logits"].shape, (6,))
-        if not recurrent:
-            return None
-        sizes = inputs["state_in"].shape[1:]
-        if not all(isinstance(size, int) for size in sizes):
-            raise GalleyError(f"input 'state_in' has shape {inputs['state_in'].shape}; fix all sizes but B")
-        shape = tuple(int(size) for size in sizes)
-        self._fit("input 'state_in'", inputs["state_in"].shape, shape)
-        self._fit("output 'state_out'", outputs["state_out"].shape, shape)
-        return shape
-
-    @staticmethod
-    def _fit(what: str, found: Sequence[object], wanted: tuple[int, ...]) -> None:
-        shown = ["B", *wanted]
-        if not found or isinstance(found[0], int):
-            raise GalleyError(
-                f"{what} has shape {list(found)}; it must be {shown} with a dynamic batch size B"
-            )
-        fits = len(found) == len(wanted) + 1 and all(
-            size == want or not isinstance(size, int) for size, want in zip(found[1:], wanted, strict=False)
-        )
-        if not fits:
-            raise GalleyError(f"{what} has shape {list(found)}, not {shown}")
+                    told.append(f"{kind} '{name}' is {found[name].type}, not tensor(float)")
+            for name, shape in shapes.items():
+                told += _misfit(f"{kind} '{name}'", found[name].shape, shape)
+        if recurrent and not told:
+            sizes = inputs["state_in"].shape[1:]
+            if all(isinstance(size, int) for size in sizes):
+                told += _misfit("input 'state_in'", inputs["state_in"].shape, sizes)
+                told += _misfit("output 'state_out'", outputs["state_out"].shape, sizes)
+            else:
+                told.append(f"input 'state_in' has shape {inputs['state_in'].shape}; fix all sizes but B")
+        if told:
+            raise GalleyError("; ".join(told))
+        return tuple(inputs["state_in"].shape[1:]) if recurrent else None
 
 
 class NetworkAgent:
@@ -211,6 +210,17 @@ def act_as_one(
         draws = uniform(seeds, seats, np.asarray(ticks))
     actions: list[int] = choose(logits, barred, draws).tolist()
     return actions
+
+
+def _misfit(what: str, found: Sequence[object], wanted: Sequence[int]) -> list[str]:
+    """What is wrong with the shape of an input or output; nothing if it is [B, *wanted] with B dynamic."""
+    shown = ["B", *wanted]
+    if not found or isinstance(found[0], int):
+        return [f"{what} has shape {list(found)}; it must be {shown} with a dynamic batch size B"]
+    fits = len(found) == len(wanted) + 1 and all(
+        size == want or not isinstance(size, int) for size, want in zip(found[1:], wanted, strict=False)
+    )
+    return [] if fits else [f"{what} has shape {list(found)}, not {shown}"]
 
 
 def _first_line(error: Exception) -> str:

@@ -1,17 +1,40 @@
-"""`galley agents`: the bundles of a workspace listed, checked and played."""
+"""`galley agents`: the bundles of a workspace listed, checked, played and added."""
 
 from __future__ import annotations
 
+import importlib.util
 import json
+import shlex
+import sys
+from collections.abc import Sequence
+from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from galley.commands.options import JsonOption, WorkspaceOption
-from galley.errors import InvalidFiles
+from galley.errors import GalleyError, InvalidFiles, Problem
 
-app = typer.Typer(help="Agents: list, check, play.", no_args_is_help=True)
+if TYPE_CHECKING:
+    from galley.agents.adding import Converted
+
+app = typer.Typer(help="Agents: list, check, play, add.", no_args_is_help=True)
+
+
+class Origin(StrEnum):
+    """What the files of a newcomer are."""
+
+    onnx = "onnx"
+    torchscript = "torchscript"
+    state_dict = "state-dict"
+
+
+class Sampling(StrEnum):
+    """How a network's agent takes its actions."""
+
+    sample = "sample"
+    argmax = "argmax"
 
 
 @app.command("list")
@@ -76,3 +99,136 @@ def play(
             f"{result.seat_0} + {result.seat_1} on {layout}: {result.mean:.1f} ± {result.standard_error:.1f}"
         )
         typer.echo(json.dumps(row) if json_ else line)
+
+
+@app.command()
+def add(
+    name: Annotated[str, typer.Option(metavar="NAME", help="Name of the new agent.")],
+    encoding: Annotated[str, typer.Option(metavar="NAME", help="Encoding of its observations.")],
+    files: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="FILE...", help="Networks; none needed where every --layout names its own."),
+    ] = None,
+    layout: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="L[=FILE]",
+            help="A layout it plays on, once for each; its file if not the one FILE, or the FILE called L.",
+            show_default="the names of the files",
+        ),
+    ] = None,
+    sampling: Annotated[
+        Sampling, typer.Option(metavar="HOW", help="sample draws actions, argmax takes the most probable.")
+    ] = Sampling.sample,
+    unstuck: Annotated[
+        str, typer.Option(metavar="N|none", help="Bar repeated actions after N ticks in one pose.")
+    ] = "none",
+    from_: Annotated[
+        Origin,
+        typer.Option(
+            "--from",
+            metavar="KIND",
+            help="onnx, torchscript (a program: it is run) or state-dict (with --network).",
+        ),
+    ] = Origin.onnx,
+    network: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NETWORK",
+            help="For a state dict: cole-cnn, bc-mlp, a YAML or JSON file, or module:Class (imports it).",
+        ),
+    ] = None,
+    replace: Annotated[bool, typer.Option("--replace", help="Overwrite the agent of this name.")] = False,
+    workspace: WorkspaceOption = Path(),
+    json_: JsonOption = False,
+) -> None:
+    """Let a network in as an agent if it passes the gate; else tell every reason and leave all as it was."""
+    from galley.agents.adding import Newcomer, add_network
+    from galley.workspace import Workspace
+
+    if (from_ is Origin.state_dict) != (network is not None):
+        raise typer.BadParameter("a state dict needs it, and nothing else takes it", param_hint="--network")
+    if unstuck != "none" and not (unstuck.isdecimal() and 1 <= int(unstuck) <= 100):
+        raise typer.BadParameter("a number of ticks from 1 to 100, or none", param_hint="--unstuck")
+    new = Newcomer(
+        name=name,
+        files=_files_by_layout(files or [], layout or []),
+        encoding=encoding,
+        sampling=sampling.value,
+        unstuck_after_ticks=None if unstuck == "none" else int(unstuck),
+        command=shlex.join(["galley", *sys.argv[1:]]),
+    )
+
+    def convert(path: Path, shape: tuple[int, ...]) -> Converted:
+        return _converted(path, shape, from_, network)
+
+    try:
+        added = add_network(Workspace(workspace), new, convert, replace=replace)
+    except InvalidFiles as error:
+        if json_:
+            typer.echo(json.dumps({"name": name, "added": False, "reasons": _reasons(error.problems)}))
+        raise
+    if json_:
+        figures = [one.as_json() for one in added.figures]
+        row = {"name": name, "added": True, "path": added.path.as_posix(), "sha256": added.sha256}
+        typer.echo(json.dumps({**row, "notes": added.notes, "layouts": figures}))
+        return
+    for one in added.figures:
+        typer.echo(
+            f"{one.layout}: score {one.score} with itself, decision {one.decision_p50_ms:.2f} ms, "
+            f"99th percentile {one.decision_p99_ms:.2f} ms"
+        )
+        for note in added.notes[one.layout]:
+            typer.echo(f"  {note}")
+    typer.echo(f"Added {name} in {added.path.as_posix()}; write what it is into its card.md.")
+
+
+def _files_by_layout(files: Sequence[Path], layouts: Sequence[str]) -> dict[str, Path]:
+    """The file for each layout: its own, the only FILE, or the FILE that is called like the layout."""
+    by_stem = {path.stem: path for path in files}
+    if len(by_stem) < len(files):
+        raise typer.BadParameter("two files have one name; use --layout L=FILE", param_hint="FILE")
+    found: dict[str, Path] = {}
+    for one in layouts or by_stem:
+        layout, equals, own = one.partition("=")
+        path = Path(own) if equals else files[0] if len(files) == 1 else by_stem.get(layout)
+        if path is None:
+            raise typer.BadParameter(f"no FILE is called {layout}; use {layout}=FILE", param_hint="--layout")
+        if layout in found:
+            raise typer.BadParameter(f"{layout} is named twice", param_hint="--layout")
+        found[layout] = path
+    unused = [path.as_posix() for path in files if path not in found.values()]
+    if unused or not found:
+        told = f"no layout takes {', '.join(unused)}" if unused else "name at least one"
+        raise typer.BadParameter(told, param_hint="FILE")
+    return found
+
+
+def _converted(path: Path, shape: tuple[int, ...], origin: Origin, network: str | None) -> Converted:
+    """The network of a file as ONNX; what changes files is imported only if one must be changed."""
+    if origin is Origin.onnx:
+        from galley.agents.adding import as_it_is
+
+        try:
+            return as_it_is(path, shape)
+        except GalleyError as error:
+            _need(["onnx"], f"{error}; what can be mended is mended with the package onnx")
+        from galley.learning.export_onnx import conform
+
+        return conform(path, shape)
+    _need(["torch", "onnx"], f"adding from {origin.value} needs PyTorch")
+    from galley.learning.export_torch import from_state_dict, from_torchscript
+
+    if network is None:
+        return from_torchscript(path, shape)
+    return from_state_dict(path, network, shape)
+
+
+def _need(packages: Sequence[str], why: str) -> None:
+    missing = [name for name in packages if importlib.util.find_spec(name) is None]
+    if missing:
+        raise GalleyError(f"{why}; {', '.join(missing)} not installed: pip install 'galley[learn]'")
+
+
+def _reasons(problems: Sequence[Problem]) -> list[dict[str, str]]:
+    return [{"file": one.path, "reason": one.message, "fix": one.fix} for one in problems]

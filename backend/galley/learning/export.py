@@ -10,8 +10,8 @@ from onnx import TensorProto, helper, numpy_helper
 
 from galley.learning.cloning import Layer
 
-_OPSET = 17
-_IR_VERSION = 8
+OPSET = 17
+IR_VERSION = 8
 """Old enough for every ONNX Runtime that Galley allows."""
 
 
@@ -41,7 +41,7 @@ def dense_onnx(layers: Sequence[Layer]) -> bytes:
         constants,
     )
     model = helper.make_model(
-        graph, opset_imports=[helper.make_opsetid("", _OPSET)], producer_name="galley", ir_version=_IR_VERSION
+        graph, opset_imports=[helper.make_opsetid("", OPSET)], producer_name="galley", ir_version=IR_VERSION
     )
     onnx.checker.check_model(model)
     content: bytes = model.SerializeToString(deterministic=True)
