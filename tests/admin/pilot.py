@@ -54,6 +54,10 @@ class Pilot:
         assert visit is not None
         return visit
 
+    def plan_steps(self) -> tuple[Step, ...]:
+        """The steps of any visit, as far as they are the same for all."""
+        return plan_visit(self.study, 1, 0).steps
+
     def walk(
         self,
         visit: VisitRow,
