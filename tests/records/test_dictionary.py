@@ -7,6 +7,7 @@ import io
 from pathlib import Path
 
 from galley.records.dictionary import dictionary_csv, dictionary_markdown
+from galley.records.human_data import HUMAN_DATA
 from galley.records.sheets import SHEETS
 from galley.records.tables import METADATA
 
@@ -29,9 +30,11 @@ def test_every_exported_column_is_explained_once() -> None:
     rows = list(csv.reader(io.StringIO(dictionary_csv()), strict=True))
     assert rows[0] == ["file", "column", "kind", "meaning"]
     assert [tuple(row) for row in rows[1:]] == [
-        (sheet.file, field.name, field.kind, field.meaning) for sheet in SHEETS for field in sheet.fields
+        (sheet.file, field.name, field.kind, field.meaning)
+        for sheet in (*SHEETS, HUMAN_DATA)
+        for field in (*sheet.fields, *sheet.patterns)
     ]
-    for sheet in SHEETS:
+    for sheet in (*SHEETS, HUMAN_DATA):
         names = [field.name for field in sheet.fields]
         assert len(names) == len(set(names)), sheet.file
         assert "token" not in names

@@ -7,8 +7,9 @@ import json
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import IO, Any, Self
+from typing import IO, Any
 
+from galley.records.part_file import PartFile
 from galley.records.sheets import Kind, Sheet
 
 # Spreadsheets take a cell that begins so for a formula. Source: OWASP, "CSV Injection".
@@ -46,21 +47,17 @@ def cell(kind: Kind, value: Any) -> str:
             return guarded(json.dumps(value, ensure_ascii=False, sort_keys=True))
 
 
-class CsvFile:
-    """One file of an export. It appears under its name only when it is whole.
+class CsvFile(PartFile):
+    """One file of an export as CSV."""
 
-    Written under another name first, so that a run that fails leaves no half of a file behind.
-    """
+    ending = "csv"
 
     def __init__(self, folder: Path, sheet: Sheet) -> None:
-        self.sheet = sheet
-        self.rows = 0
-        self._path = folder / sheet.file
-        self._part = folder / f".{sheet.file}.part"
+        super().__init__(folder, sheet)
         # A lone surrogate cannot be UTF-8; it is spelt out rather than losing the export.
-        self._file: IO[str] = self._part.open("w", encoding="utf-8", errors="backslashreplace", newline="")
+        self._file: IO[str] = self.part.open("w", encoding="utf-8", errors="backslashreplace", newline="")
         self._csv = csv.writer(self._file, lineterminator="\r\n")
-        self._csv.writerow([field.name for field in sheet.fields])
+        self._csv.writerow([guarded(field.name) for field in sheet.fields])
 
     def write(self, values: Mapping[str, Any]) -> None:
         """Add a row: a value, or None, for every column.
@@ -70,12 +67,6 @@ class CsvFile:
         self._csv.writerow([cell(field.kind, values[field.name]) for field in self.sheet.fields])
         self.rows += 1
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+    def close(self) -> None:
+        """Nothing more is written."""
         self._file.close()
-        if kind is None:
-            self._part.replace(self._path)
-        else:
-            self._part.unlink(missing_ok=True)

@@ -10,6 +10,7 @@ import io
 import sys
 from collections.abc import Iterator
 
+from galley.records.human_data import HUMAN_DATA
 from galley.records.sheets import SHEETS
 from galley.records.tables import METADATA
 
@@ -27,6 +28,10 @@ server; the secret of their link is never exported.
   line break. Texts that begin so, or with an apostrophe, have one apostrophe `'` put in front: take the
   first apostrophe away to get the text as it was given. In R: `sub("^'", "", x)`; in pandas:
   `x.str.replace(r"^'", "", regex=True)`. Numbers and times are never changed.
+- JSON Lines (`--format jsonl`) and Parquet (`--format parquet`) hold the same rows under the same names,
+  without the guard: JSON values stay JSON in JSON Lines and are text in Parquet, where times are timestamps.
+- A person's own words, link parameters and notes about them are in the files as they are: treat them as such.
+- Visits made to try a study out are left out unless `--tests` is given.
 - A tick is counted from 0: row `tick` holds the joint action taken in that tick. `round_id` joins rounds,
   ticks, events, keys, pauses and clocks; `participant` joins everything.
 """
@@ -49,16 +54,19 @@ def dictionary_csv() -> str:
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\r\n")
     writer.writerow(["file", "column", "kind", "meaning"])
-    for sheet in SHEETS:
-        writer.writerows([sheet.file, field.name, field.kind, field.meaning] for field in sheet.fields)
+    for sheet in (*SHEETS, HUMAN_DATA):
+        writer.writerows(
+            [sheet.file, field.name, field.kind, field.meaning] for field in (*sheet.fields, *sheet.patterns)
+        )
     return out.getvalue()
 
 
 def _sheets() -> Iterator[str]:
-    for sheet in SHEETS:
+    for sheet in (*SHEETS, HUMAN_DATA):
         yield f"## {sheet.file}\n\n{sheet.about} Order: {sheet.order}.\n"
         yield "| column | kind | meaning |\n|---|---|---|"
-        yield from (_line(field.name, field.kind, field.meaning) for field in sheet.fields)
+        columns = (*sheet.fields, *sheet.patterns)
+        yield from (_line(field.name, field.kind, field.meaning) for field in columns)
         yield ""
 
 

@@ -1,51 +1,107 @@
-"""A study's records as CSV files with their data dictionary, written row by row whatever their size."""
+"""A study's records as files with their data dictionary, written row by row whatever their size."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
-from sqlalchemy import Connection, select
+from sqlalchemy import Connection, func, select
 
 from galley.errors import GalleyError
 from galley.records import queries
 from galley.records.csv_file import CsvFile
 from galley.records.dictionary import dictionary_csv, dictionary_markdown
 from galley.records.export_round import RoundExport
+from galley.records.flags import Flag, flags
+from galley.records.jsonl_file import JsonLinesFile
+from galley.records.parquet_file import ParquetFile
+from galley.records.part_file import PartFile
 from galley.records.rows import RoundRow, VisitRow
-from galley.records.sheets import PARTICIPANTS, RESPONSES_SHEET, SHEETS, STAGES_SHEET
+from galley.records.sheets import (
+    ABSENCES_SHEET,
+    ATTEMPTS_SHEET,
+    NOTES_SHEET,
+    PARTICIPANTS,
+    RESPONSES_SHEET,
+    SHEETS,
+    STAGES_SHEET,
+    WIDE,
+)
 from galley.records.store import Store
-from galley.records.tables import RESPONSES, STAGES
+from galley.records.tables import ABSENCES, ATTEMPTS, NOTES, RESPONSES, STAGES
+from galley.records.wide import Wide
 from galley.study.plan import Plan, Step
 
+FORMATS: Final[dict[str, type[PartFile]]] = {
+    "csv": CsvFile,
+    "jsonl": JsonLinesFile,
+    "parquet": ParquetFile,
+}
 
-def export_study(store: Store, study: str, out: Path) -> dict[str, int]:
+
+class _Copies:
+    """One sheet in every format that is wanted."""
+
+    def __init__(self, files: Sequence[PartFile]) -> None:
+        self.files = files
+
+    def write(self, values: Mapping[str, Any]) -> None:
+        for file in self.files:
+            file.write(values)
+
+
+def export_study(
+    store: Store, study: str, out: Path, formats: Sequence[str] = ("csv",), include_test: bool = False
+) -> dict[str, int]:
     """Rows written per file name, after writing the study's records to the folder `out`.
 
-    Everything is read from the database as it stood at the start, however long the export takes.
-    Raises: GalleyError if nobody visited the study, or the folder cannot be written.
+    Everything is read from the database as it stood at the start, however long the export takes. Visits made
+    to try the study out are left out unless `include_test`.
+    Raises: GalleyError if nobody visited the study, a format is unknown or lacks its library, or the folder
+    cannot be written.
     """
+    unknown = [name for name in formats if name not in FORMATS]
+    if unknown or not formats:
+        raise GalleyError(
+            f"export format {', '.join(unknown) or '(none)'} is unknown; use {', '.join(FORMATS)}"
+        )
     with store.reading() as connection:
         queries.must_know(connection, store.name, study)
         try:
             out.mkdir(parents=True, exist_ok=True)
             with ExitStack() as stack:
-                files = {sheet.name: stack.enter_context(CsvFile(out, sheet)) for sheet in SHEETS}
-                for visit in queries.visits(connection, study):
-                    _Visit(connection, visit, files).write()
+                wide = Wide(connection, study)
+                sheets = [wide.sheet if sheet is WIDE else sheet for sheet in SHEETS]
+                files = {
+                    sheet.name: _Copies([stack.enter_context(FORMATS[name](out, sheet)) for name in formats])
+                    for sheet in sheets
+                }
+                flagged = flags(connection, study)
+                for visit in queries.visits(connection, study, tests=include_test):
+                    _Visit(connection, visit, files, wide, flagged.get(visit.id, ())).write()
             (out / "data-dictionary.md").write_text(dictionary_markdown(), encoding="utf-8")
             (out / "data-dictionary.csv").write_text(dictionary_csv(), encoding="utf-8", newline="")
         except OSError as error:
             raise GalleyError(f"{out}: {error.strerror or error}; name another folder with --out") from None
-    return {file.sheet.file: file.rows for file in files.values()}
+    return {file.path.name: file.rows for copies in files.values() for file in copies.files}
 
 
 class _Visit:
     """Writes everything about one visit."""
 
-    def __init__(self, connection: Connection, visit: VisitRow, files: Mapping[str, CsvFile]) -> None:
+    def __init__(
+        self,
+        connection: Connection,
+        visit: VisitRow,
+        files: Mapping[str, _Copies],
+        wide: Wide,
+        flagged: Sequence[Flag],
+    ) -> None:
+        self.wide = wide
+        self.flags = flagged
+        self.rounds: dict[str, RoundRow] = {}
         self.connection = connection
         self.visit = visit
         self.files = files
@@ -61,13 +117,40 @@ class _Visit:
         statuses = []
         for round_id in queries.rounds_of_visit(self.connection, self.visit.id):
             row = queries.round_row(self.connection, round_id)
-            step = self._step(str(row.human.step_id))
+            step = self._step(next(str(s.step_id) for s in row.seats if s.visit_id == self.visit.id))
+            self.rounds[step.id] = row
             if not step.data.get("tutorial"):
                 statuses.append(row.status)
-            self._round(row, step)
+            if row.human.visit_id == self.visit.id:  # a round for two is written with the other one
+                self._round(row, step)
         self._participant(statuses)
         self._stages()
         self._responses()
+        self._small_sheets()
+        who = {**self.who, "status": self.visit.status, "language": self.visit.language}
+        duration_s = _seconds(self.visit.created_ms, self.visit.ended_ms)
+        self.files[WIDE.name].write({**who, "duration_s": duration_s, **self._wide()})
+
+    def _wide(self) -> dict[str, Any]:
+        answers = queries.answers(self.connection, self.visit.id)
+        told = {step: {item: _joined(value) for item, value in of.items()} for step, of in answers.items()}
+        return self.wide.row(self.visit, told, self.rounds)
+
+    def _small_sheets(self) -> None:
+        for sheet, table in ((ATTEMPTS_SHEET, ATTEMPTS), (ABSENCES_SHEET, ABSENCES), (NOTES_SHEET, NOTES)):
+            mine = select(table).where(table.c.visit_id == self.visit.id).order_by(*table.primary_key.columns)
+            for row in self.connection.execute(mine).mappings():
+                at = {"step": row.get("step_id"), "step_index": self.places.get(row.get("step_id", ""))}
+                times = {"sent_utc": row.get("at_ms"), "written_utc": row.get("at_ms")}
+                span = {"started_utc": row.get("started_ms"), "ended_utc": row.get("ended_ms")}
+                if "started_ms" in row:
+                    span["duration_s"] = _seconds(row["started_ms"], row["ended_ms"])
+                self.files[sheet.name].write({**self.who, **row, **at, **times, **span})
+
+    def _hidden_s(self) -> float:
+        gone = select(func.sum(ABSENCES.c.ended_ms - ABSENCES.c.started_ms))
+        hidden_ms = self.connection.execute(gone.where(ABSENCES.c.visit_id == self.visit.id)).scalar()
+        return float(hidden_ms or 0) / 1000
 
     def _step(self, step_id: str) -> Step:
         return self.plan.steps[self.places[step_id]]
@@ -83,6 +166,13 @@ class _Visit:
                 **self.who,
                 "study": visit.study,
                 "study_sha256": visit.study_sha256,
+                "slot": visit.slot,
+                "test": visit.test,
+                "language": visit.language,
+                "consent_sha256": visit.consent_sha256,
+                "flags": " | ".join(flag.kind for flag in self.flags) or None,
+                "last_seen_utc": visit.last_seen_ms,
+                "hidden_s": self._hidden_s(),
                 "seed": visit.seed,
                 "status": visit.status,
                 "step_index": visit.step_index,
@@ -137,6 +227,7 @@ class _Visit:
                     },
                     "value": _joined(row["value"]),
                     "label": _label(row["value"], shown),
+                    "passed": row["passed"],
                     "answered_utc": row["at_ms"],
                     **self._asked_about(step),
                     **_compared(step, row["value"], shown),
@@ -150,7 +241,11 @@ class _Visit:
             return dict.fromkeys(names)
         before = self.plan.steps[: self.places[step.id]]
         played = next(s for s in reversed(before) if s.kind == "round")
-        return {name: played.data[name] for name in names}
+        about = {name: played.data.get(name) for name in names}
+        row = self.rounds.get(played.id)
+        if row is not None:  # the lobby may have found another partner than was planned
+            about["agent"] = next(s.agent for s in row.seats if s.visit_id != self.visit.id)
+        return about
 
 
 def _compared(step: Step, value: Any, shown: Mapping[str, Any]) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from sqlalchemy import Connection
@@ -12,7 +12,6 @@ from sqlalchemy import Connection
 from galley.errors import GalleyError
 from galley.kitchen import ACTIONS
 from galley.records import queries
-from galley.records.csv_file import CsvFile
 from galley.records.replay import Replayed, replay_round
 from galley.records.rows import RoundRow
 from galley.records.sheets import (
@@ -27,6 +26,13 @@ from galley.records.sheets import (
 from galley.records.tables import CLOCKS, KEYS, PAUSES, TICKS
 
 Rows = Sequence[Mapping[str, Any]]
+
+
+class TableFile(Protocol):
+    """What takes the rows of one sheet."""
+
+    def write(self, values: Mapping[str, Any]) -> None:
+        """Add a row."""
 
 
 class RoundExport:
@@ -44,9 +50,10 @@ class RoundExport:
         self.human, self.partner = row.human, row.partner
         self.ticks: Rows = queries.of_round(connection, TICKS, row.id)
         self.pauses: Rows = queries.of_round(connection, PAUSES, row.id)
-        seat = self.human.seat
-        self.keys = [key for key in queries.of_round(connection, KEYS, row.id) if key["seat"] == seat]
-        self.clocks = [ping for ping in queries.of_round(connection, CLOCKS, row.id) if ping["seat"] == seat]
+        self.people = queries.participants(connection, row)
+        # An erased person has no name, and none of their keys and pings are left.
+        self.keys = queries.of_round(connection, KEYS, row.id)
+        self.clocks = queries.of_round(connection, CLOCKS, row.id)
         self.replay = self._replay()
 
     def _replay(self) -> Replayed | None:
@@ -56,25 +63,29 @@ class RoundExport:
             return None
         return None if replay.problems else replay
 
-    def write(self, files: Mapping[str, CsvFile]) -> None:
+    def write(self, files: Mapping[str, TableFile]) -> None:
         """Add this round's rows to the files, named by their sheets."""
         files[ROUNDS_SHEET.name].write(self._round())
         self._write_ticks(files[TICKS_SHEET.name])
         self._write_events(files[EVENTS_SHEET.name])
         for key in self.keys:
-            files[KEYS_SHEET.name].write({**self.at, **key, "arrival_utc": key["arrival_ms"]})
+            who = {"participant": self.people.get(key["seat"])}
+            files[KEYS_SHEET.name].write({**self.at, **key, **who, "arrival_utc": key["arrival_ms"]})
         for pause in self.pauses:
             times = {"started_utc": pause["started_ms"], "ended_utc": pause["ended_ms"]}
             files[PAUSES_SHEET.name].write({**self.at, **pause, **times})
         for ping in self.clocks:
-            files[CLOCKS_SHEET.name].write({**self.at, **ping, "server_utc": ping["server_ms"]})
+            who = {"participant": self.people.get(ping["seat"])}
+            files[CLOCKS_SHEET.name].write({**self.at, **ping, **who, "server_utc": ping["server_ms"]})
 
     def _round(self) -> dict[str, Any]:
         row = self.row
         goal = (self.settings.get("goal") or {}).get("score")
         lateness = [tick["lateness_ms"] for tick in self.ticks]
         decisions = [tick["decision_ms"] for tick in self.ticks if tick["decision_ms"] is not None]
-        rtts = [ping["rtt_ms"] for ping in self.clocks if ping["rtt_ms"] is not None]
+        mine = (ping for ping in self.clocks if ping["seat"] == self.human.seat)
+        rtts = [ping["rtt_ms"] for ping in mine if ping["rtt_ms"] is not None]
+        other = row.stand_ins[0] if row.stand_ins else None
         paused = [p["ended_ms"] - p["started_ms"] for p in self.pauses if p["ended_ms"] is not None]
         return {
             **self.at,
@@ -83,11 +94,16 @@ class RoundExport:
             "layout_sha256": hashlib.sha256(row.layout_json.encode()).hexdigest(),
             "agent": self.partner.agent,
             "agent_sha256": self.partner.agent_sha256,
+            "partner_participant": self.people.get(self.partner.seat),
+            "stand_in": other and other.agent,
+            "stand_in_seat": other and other.seat,
+            "stand_in_tick": other and other.tick,
             "human_seat": self.human.seat,
             "human_hat": self.human.hat or self.settings.get("human_hat"),
             "partner_hat": self.partner.hat,
             "seed": row.seed,
             "horizon_ticks": row.horizon_ticks,
+            "episodes": row.episodes,
             "tick_ms": row.tick_ms,
             "status": row.status,
             "ticks": len(self.ticks),
@@ -122,7 +138,7 @@ class RoundExport:
         together = ("concurrent_ticks", "stuck_ticks", "delivery_ticks", "performance")
         return {**chefs, **{name: getattr(found, name) for name in together}}
 
-    def _write_ticks(self, file: CsvFile) -> None:
+    def _write_ticks(self, file: TableFile) -> None:
         rewards = None if self.replay is None else self.replay.rewards
         score = 0
         for number, tick in enumerate(self.ticks):
@@ -142,7 +158,7 @@ class RoundExport:
                 }
             )
 
-    def _write_events(self, file: CsvFile) -> None:
+    def _write_events(self, file: TableFile) -> None:
         by = {None: None, self.human.seat: "human", self.partner.seat: "partner"}
         for event in () if self.replay is None else self.replay.events():
             columns = ("tick", "seat", "kind", "thing", "place", "x", "y", "reward")

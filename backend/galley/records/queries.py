@@ -48,10 +48,11 @@ def answers(connection: Connection, visit_id: int) -> dict[str, dict[str, Any]]:
     return found
 
 
-def visits(connection: Connection, study: str) -> Iterator[VisitRow]:
-    """Every visit of a study in order of arrival, read a few at a time."""
+def visits(connection: Connection, study: str, tests: bool = True) -> Iterator[VisitRow]:
+    """Every visit of a study in order of arrival, one at a time; `tests` says whether to give tests too."""
+    query = select(VISITS.c.id).where(VISITS.c.study == study)
     ids = connection.execute(
-        select(VISITS.c.id).where(VISITS.c.study == study).order_by(VISITS.c.visit_no)
+        (query if tests else query.where(~VISITS.c.test)).order_by(VISITS.c.visit_no)
     ).scalars()
     for visit_id in ids.all():
         yield visit_row(
@@ -111,6 +112,13 @@ def joint_actions(connection: Connection, round_id: int) -> NDArray[np.uint8]:
     )
     pairs = [tuple(row) for row in connection.execute(query)]
     return np.array(pairs, dtype=np.uint8).reshape(-1, 2)
+
+
+def participants(connection: Connection, row: RoundRow) -> dict[int, str]:
+    """The name in exports of the person at each seat that has one."""
+    seats = {seat.visit_id: seat.seat for seat in row.seats if seat.visit_id is not None}
+    query = select(VISITS.c.id, VISITS.c.participant).where(VISITS.c.id.in_(seats))
+    return {seats[visit_id]: participant for visit_id, participant in connection.execute(query)}
 
 
 def of_round(connection: Connection, table: Table, round_id: int) -> list[dict[str, Any]]:

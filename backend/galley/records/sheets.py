@@ -9,7 +9,20 @@ from typing import Any, Final, Literal
 from sqlalchemy import Column
 
 from galley.kitchen.events import EVENTS, PLACES
-from galley.records.tables import CLOCKS, KEYS, PAUSES, RESPONSES, ROUNDS, STAGES, TICKS, VISITS
+from galley.records.flags import FLAGS
+from galley.records.tables import (
+    ABSENCES,
+    ATTEMPTS,
+    CLOCKS,
+    KEYS,
+    NOTES,
+    PAUSES,
+    RESPONSES,
+    ROUNDS,
+    STAGES,
+    TICKS,
+    VISITS,
+)
 
 Kind = Literal["text", "whole number", "number", "true/false", "time", "JSON"]
 
@@ -31,10 +44,12 @@ class Sheet:
     about: str
     order: str
     fields: tuple[Field, ...]
+    patterns: tuple[Field, ...] = ()
+    """Further columns, as many as the study has steps and items."""
 
     @property
     def file(self) -> str:
-        """Name of the file in the export's folder."""
+        """Name of the file in a CSV export's folder."""
         return f"{self.name}.csv"
 
 
@@ -65,6 +80,8 @@ def _chef(name: str) -> Iterator[Field]:
     yield Field(f"{name}_blocked", "whole number", f"moves that left the {name} in its cell")
 
 
+_FLAGS: Final = "; ".join(f"{kind}: {meaning}" for kind, meaning in FLAGS.items())
+
 PARTICIPANTS: Final = Sheet(
     "participants",
     "One row per visit.",
@@ -74,8 +91,13 @@ PARTICIPANTS: Final = Sheet(
         _as_in(VISITS.c.study, "text"),
         _as_in(VISITS.c.study_sha256, "text"),
         _CONDITION,
+        _as_in(VISITS.c.slot, "whole number"),
+        _as_in(VISITS.c.test, "true/false"),
+        _as_in(VISITS.c.language, "text"),
+        _as_in(VISITS.c.consent_sha256, "text"),
         _as_in(VISITS.c.seed, "text"),
         _as_in(VISITS.c.status, "text"),
+        Field("flags", "text", "what stands out, separated by ' | ': " + _FLAGS),
         Field("step_index", "whole number", "how far the visit came: place of its present step, from 0"),
         Field("step", "text", "how far the visit came: its present step"),
         Field("steps", "whole number", "steps of the visit's whole plan"),
@@ -84,7 +106,9 @@ PARTICIPANTS: Final = Sheet(
         _as_in(VISITS.c.link_params, "JSON"),
         Field("begun_utc", "time", str(VISITS.c.created_ms.doc)),
         Field("ended_utc", "time", str(VISITS.c.ended_ms.doc)),
+        Field("last_seen_utc", "time", str(VISITS.c.last_seen_ms.doc)),
         Field("duration_s", "number", "seconds from begin to end"),
+        Field("hidden_s", "number", "seconds that the page was hidden behind another tab or window"),
         Field("rounds_finished", "whole number", "rounds played to their end, tutorials left out"),
         Field("rounds_abandoned", "whole number", "rounds left before their end, tutorials left out"),
     ),
@@ -97,7 +121,11 @@ STAGES_SHEET: Final = Sheet(
     (
         *_WHO,
         *_STEP,
-        Field("kind", "text", "consent, questionnaire, instructions, round, comparison or debrief"),
+        Field(
+            "kind",
+            "text",
+            "consent, questionnaire, quiz, instructions, round, break, comparison, debrief, ...",
+        ),
         Field("title", "text", "title of its page"),
         Field("entered_utc", "time", str(STAGES.c.entered_ms.doc)),
         Field("left_utc", "time", str(STAGES.c.left_ms.doc)),
@@ -117,7 +145,8 @@ MEASURES: Final = (
 
 ROUNDS_SHEET: Final = Sheet(
     "rounds",
-    "One row per round, with its outcome and the measures of coordination.",
+    "One row per round, with its outcome and the measures of coordination; a round for two people has one "
+    "row, under the visit with the lower seat.",
     "visit_no, round_id",
     (
         *_WHO,
@@ -127,13 +156,22 @@ ROUNDS_SHEET: Final = Sheet(
         Field("tutorial", "true/false", "a round for practice"),
         _as_in(ROUNDS.c.layout, "text"),
         Field("layout_sha256", "text", "hash of the layout in full, rules included"),
-        Field("agent", "text", "name of the agent that was the partner"),
-        Field("agent_sha256", "text", "hash of the agent's bundle"),
+        Field("agent", "text", "name of the agent that was the partner; empty for a person"),
+        Field("agent_sha256", "text", "hash of the agent's bundle; empty for a person"),
+        Field(
+            "partner_participant",
+            "text",
+            "the other participant of a round for two, who has no row of their own for it; empty if erased",
+        ),
+        Field("stand_in", "text", "name of the agent that took the seat of a person who left"),
+        Field("stand_in_seat", "whole number", "that seat"),
+        Field("stand_in_tick", "whole number", "first tick that it played"),
         Field("human_seat", "whole number", "seat of the participant"),
         Field("human_hat", "text", "colour of the participant's hat"),
         Field("partner_hat", "text", "colour of the partner's hat"),
         _as_in(ROUNDS.c.seed, "text"),
         _as_in(ROUNDS.c.horizon_ticks, "whole number"),
+        _as_in(ROUNDS.c.episodes, "whole number"),
         _as_in(ROUNDS.c.tick_ms, "whole number"),
         _as_in(ROUNDS.c.status, "text"),
         Field("ticks", "whole number", "ticks played"),
@@ -190,6 +228,7 @@ KEYS_SHEET: Final = Sheet(
     (
         _WHO[0],
         *_ROUND,
+        _as_in(KEYS.c.seat, "whole number"),
         _as_in(KEYS.c.seq, "whole number"),
         _as_in(KEYS.c.key, "text"),
         _as_in(KEYS.c.down, "true/false"),
@@ -220,6 +259,7 @@ CLOCKS_SHEET: Final = Sheet(
     (
         _WHO[0],
         *_ROUND,
+        _as_in(CLOCKS.c.seat, "whole number"),
         _as_in(CLOCKS.c.client_ms, "number"),
         Field("server_utc", "time", str(CLOCKS.c.server_ms.doc)),
         _as_in(CLOCKS.c.rtt_ms, "number"),
@@ -244,6 +284,7 @@ RESPONSES_SHEET: Final = Sheet(
         Field("high_label", "text", "label of the last point"),
         Field("value", "text", "the answer; several options are separated by ' | '; empty if left blank"),
         Field("label", "text", "the chosen option, or several, in the words that were shown"),
+        _as_in(RESPONSES.c.passed, "true/false"),
         Field("answered_utc", "time", str(RESPONSES.c.at_ms.doc)),
         Field("round_no", "whole number", "the round that was asked about; empty if none was"),
         Field("layout", "text", "the layout of that round"),
@@ -281,8 +322,73 @@ EVENTS_SHEET: Final = Sheet(
     ),
 )
 
+ATTEMPTS_SHEET: Final = Sheet(
+    "attempts",
+    "One row per failed attempt at a quiz.",
+    "visit_no, step_index, attempt",
+    (
+        *_WHO,
+        *_STEP,
+        _as_in(ATTEMPTS.c.attempt, "whole number"),
+        _as_in(ATTEMPTS.c.answers, "JSON"),
+        _as_in(ATTEMPTS.c.wrong, "JSON"),
+        Field("sent_utc", "time", str(ATTEMPTS.c.at_ms.doc)),
+    ),
+)
+
+ABSENCES_SHEET: Final = Sheet(
+    "absences",
+    "One row per time that a participant's page was hidden.",
+    "visit_no, started",
+    (
+        *_WHO,
+        *_STEP,
+        Field("started_utc", "time", str(ABSENCES.c.started_ms.doc)),
+        Field("ended_utc", "time", str(ABSENCES.c.ended_ms.doc)),
+        Field("duration_s", "number", "seconds in between"),
+    ),
+)
+
+NOTES_SHEET: Final = Sheet(
+    "notes",
+    "One row per note of a researcher.",
+    "visit_no, time",
+    (
+        *_WHO,
+        _as_in(NOTES.c.author, "text"),
+        _as_in(NOTES.c.text, "text"),
+        Field("written_utc", "time", str(NOTES.c.at_ms.doc)),
+    ),
+)
+
+ROUND_COLUMNS: Final = (
+    Field("layout", "text", str(ROUNDS.c.layout.doc)),
+    Field("agent", "text", "name of the agent that was the partner; empty for a person"),
+    Field("status", "text", str(ROUNDS.c.status.doc)),
+    Field("score", "whole number", str(ROUNDS.c.score.doc)),
+    Field("deliveries", "whole number", str(ROUNDS.c.deliveries.doc)),
+)
+
+WIDE: Final = Sheet(
+    "wide",
+    "One row per visit with all its answers and rounds side by side.",
+    "visit_no",
+    (
+        *_WHO,
+        _as_in(VISITS.c.status, "text"),
+        _as_in(VISITS.c.language, "text"),
+        Field("duration_s", "number", "seconds from begin to end"),
+    ),
+    (
+        Field("condition.FACTOR", "text", "level of a factor that varies between participants"),
+        Field("STEP.ITEM", "text", "the answer to an item; several options are separated by ' | '"),
+        *(Field(f"STEP.{field.name}", field.kind, f"round: {field.meaning}") for field in ROUND_COLUMNS),
+    ),
+)
+
 SHEETS: Final = (
     PARTICIPANTS,
+    WIDE,
     STAGES_SHEET,
     RESPONSES_SHEET,
     ROUNDS_SHEET,
@@ -291,4 +397,7 @@ SHEETS: Final = (
     KEYS_SHEET,
     PAUSES_SHEET,
     CLOCKS_SHEET,
+    ATTEMPTS_SHEET,
+    ABSENCES_SHEET,
+    NOTES_SHEET,
 )

@@ -41,6 +41,11 @@ class StoreBase:
         self._writer = Writer(engine, flush_s, patience_s)
         self._readers = ThreadPoolExecutor(READERS, thread_name_prefix="galley-reader")
 
+    @property
+    def engine(self) -> Engine:
+        """For work that no transaction can hold, such as rewriting the file."""
+        return self._engine
+
     def write(
         self, work: Callable[[Connection], T], *, first: int | Literal["all"] | None = None
     ) -> Future[T]:
