@@ -7,7 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from galley.agents.choosing import choose
+from galley.agents.choosing import choose, draws_for
+from galley.randomness import uniform
 
 LOGITS = hnp.arrays(np.float32, (3, 6), elements=st.floats(-50, 50, width=32))
 BARRED = hnp.arrays(np.bool_, (3, 6))
@@ -42,3 +43,10 @@ def test_sampling_follows_the_softmax() -> None:
 def test_the_most_probable_is_the_first_of_equals() -> None:
     logits = np.array([[1.0, 3.0, 3.0, 0.0, 0.0, 0.0]], dtype=np.float32)
     assert choose(logits, np.zeros((1, 6), dtype=bool), None).tolist() == [1]
+
+
+@given(st.lists(st.tuples(st.integers(0, 2**64 - 1), st.integers(0, 1), st.integers(0, 30_000)), min_size=1))
+def test_draws_are_those_of_the_randomness_of_agents(rows: list[tuple[int, int, int]]) -> None:
+    seeds, seats, ticks = zip(*rows, strict=True)
+    drawn = draws_for(np.array(seeds, dtype=np.uint64), np.array(seats), np.array(ticks))
+    assert drawn.tolist() == [uniform(*row) for row in rows]

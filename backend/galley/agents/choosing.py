@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
+
+from galley.planning.compiling import kernel
+from galley.planning.draw_kernel import draw
 
 
 def choose(
@@ -17,15 +22,76 @@ def choose(
     (float64 [B] in [0, 1)) the action is sampled from the softmax by inversion; without, the most probable is
     taken, the first of equals.
     """
-    allowed = ~barred
-    allowed[~allowed.any(axis=1)] = True
-    free = np.where(allowed, logits.astype(np.float64), -np.inf)
+    actions = np.empty(len(logits), dtype=np.int64)
     if draws is None:
-        best: NDArray[np.int64] = free.argmax(axis=1)
-        return best
-    weights = np.exp(free - free.max(axis=1, keepdims=True))
-    reached = weights.cumsum(axis=1)
-    actions = (reached <= draws[:, None] * reached[:, -1:]).sum(axis=1)
-    last = logits.shape[1] - 1 - allowed[:, ::-1].argmax(axis=1)
-    chosen: NDArray[np.int64] = np.minimum(actions, last)
-    return chosen
+        _best(np.ascontiguousarray(logits), barred, actions)
+    else:
+        _sampled(np.ascontiguousarray(logits), barred, draws, actions)
+    return actions
+
+
+def draws_for(
+    seeds: NDArray[np.uint64], seats: NDArray[np.int64], ticks: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """What `galley.randomness.uniform` gives for each row, float64 [B], in a fraction of its time."""
+    draws = np.empty(len(seeds), dtype=np.float64)
+    _draw(seeds, seats, ticks, draws)
+    return draws
+
+
+@kernel
+def _draw(
+    seeds: NDArray[np.uint64],
+    seats: NDArray[np.int64],
+    ticks: NDArray[np.int64],
+    draws: NDArray[np.float64],
+) -> None:
+    for row in range(len(seeds)):
+        draws[row] = draw(seeds[row], seats[row], ticks[row], 0)
+
+
+@kernel
+def _largest(logits: NDArray[np.float32], barred: NDArray[np.bool_]) -> int:
+    """The first place of the largest of the logits that are not barred, -1 if all are."""
+    best = -1
+    for action in range(len(logits)):
+        if not barred[action] and (best < 0 or logits[action] > logits[best]):
+            best = action
+    return best
+
+
+@kernel
+def _best(logits: NDArray[np.float32], barred: NDArray[np.bool_], actions: NDArray[np.int64]) -> None:
+    for row in range(len(logits)):
+        best = _largest(logits[row], barred[row])
+        actions[row] = best if best >= 0 else _largest(logits[row], np.zeros_like(barred[row]))
+
+
+@kernel
+def _sampled(
+    logits: NDArray[np.float32],
+    barred: NDArray[np.bool_],
+    draws: NDArray[np.float64],
+    actions: NDArray[np.int64],
+) -> None:
+    weights = np.empty(logits.shape[1], dtype=np.float64)
+    for row in range(len(logits)):
+        best = _largest(logits[row], barred[row])
+        free = best < 0
+        if free:
+            best = _largest(logits[row], np.zeros_like(barred[row]))
+        total = 0.0
+        for action in range(len(weights)):
+            weight = 0.0
+            if free or not barred[row, action]:
+                weight = math.exp(float(logits[row, action]) - float(logits[row, best]))
+            total += weight
+            weights[action] = weight
+        wanted = draws[row] * total
+        reached = 0.0
+        for action in range(len(weights)):
+            if weights[action] > 0:
+                actions[row] = action
+                reached += weights[action]
+                if reached > wanted:
+                    break

@@ -11,10 +11,9 @@ import numpy as np
 import onnxruntime as ort
 from numpy.typing import NDArray
 
-from galley.agents.choosing import choose
+from galley.agents.choosing import choose, draws_for
 from galley.errors import GalleyError
 from galley.kitchen import ACTIONS, Encoder, Layout
-from galley.randomness import uniform
 
 Sampling = Literal["sample", "argmax"]
 
@@ -192,7 +191,7 @@ def act_as_one(
 ) -> list[int]:
     """The actions of agents with equal companions from one run of their network."""
     first = twins[0]
-    seats = np.array([twin.seat for twin in twins])
+    seats = np.array([twin.seat for twin in twins], dtype=np.int64)
     observations = first.encoder.seat(np.stack(states), seats).astype(np.float32)
     memories = None
     if first.network.recurrent:
@@ -207,7 +206,7 @@ def act_as_one(
     draws = None
     if first.sampling == "sample":
         seeds = np.array([twin.seed & _WORD for twin in twins], dtype=np.uint64)
-        draws = uniform(seeds, seats, np.asarray(ticks))
+        draws = draws_for(seeds, seats, np.array(ticks, dtype=np.int64))
     actions: list[int] = choose(logits, barred, draws).tolist()
     return actions
 
