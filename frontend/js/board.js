@@ -51,6 +51,7 @@
  * @property {number} episode
  * @property {number} episodes
  * @property {"during" | "after" | "never"} showScore
+ * @property {string} you the word over the participant's own chef
  * @property {boolean} alone nobody is on the other seat
  */
 
@@ -73,10 +74,10 @@ function standing([x, y, facing, held]) {
 
 /**
  * The board a keyframe describes.
- * @param {Keyframe} frame
+ * @param {Keyframe} frame @param {string} [you] the word for the participant's own chef
  * @returns {Board}
  */
-export function boardFrom(frame) {
+export function boardFrom(frame, you = "") {
   return {
     phase: frame.phase, tick: frame.tick, horizon: frame.horizon, tickMs: frame.tick_ms,
     seat: frame.seat, hats: frame.hats, grid: frame.grid, cookTime: frame.cook_time,
@@ -87,7 +88,7 @@ export function boardFrom(frame) {
     score: frame.score, scoredAt: NEVER, goal: frame.goal, round: frame.round, of: frame.of,
     tutorial: frame.tutorial, orders: frame.orders, effects: [],
     points: frame.points ?? null, episode: frame.episode ?? 1, episodes: frame.episodes ?? 1,
-    showScore: frame.show_score ?? "during", alone: frame.partner === "none",
+    showScore: frame.show_score ?? "during", you, alone: frame.partner === "none",
   };
 }
 

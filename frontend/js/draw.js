@@ -57,7 +57,7 @@ export function draw(context, board, sprites, kitchen, now) {
   layers.sort((a, b) => a[0] - b[0]);
   for (const [, layer] of layers) layer();
   for (const effect of board.effects) drawEffect(context, board, effect, s, now, quiet);
-  if (board.phase === "playing" ? board.tick < ALREADY_KNOWN_TICKS : board.phase !== "ended") pointer(context, seen[board.seat] ?? [0, 0], s, now, quiet);
+  if (board.phase === "playing" ? board.tick < ALREADY_KNOWN_TICKS : board.phase !== "ended") pointer(context, board.you, seen[board.seat] ?? [0, 0], s, now, quiet);
 }
 
 /** @param {Chef} chef @param {number} now @param {number} tickMs @param {boolean} quiet @returns {[number, number]} */
@@ -133,15 +133,16 @@ function marker(context, board, [x = 0, y = 0], s, now, quiet) {
   context.globalAlpha = 1;
 }
 
-/** "You": an arrow over the own chef until it has moved. @param {Context} context @param {readonly number[]} seen
- * @param {number} s @param {number} now @param {boolean} quiet */
-function pointer(context, [x = 0, y = 0], s, now, quiet) {
+/** "You" in the page's language: an arrow over the own chef until it has moved. @param {Context} context
+ * @param {string} you @param {readonly number[]} seen @param {number} s @param {number} now @param {boolean} quiet */
+function pointer(context, you, [x = 0, y = 0], s, now, quiet) {
+  if (!you) return;
   const bob = quiet ? 0 : 0.06 * pulse(now, 800);
   const [mx, my] = [(x + 0.5) * s, (y - 0.42 - bob) * s];
   context.font = `700 ${Math.round(0.24 * s)}px system-ui, sans-serif`;
   context.textAlign = "center";
   context.textBaseline = "middle";
-  const w = context.measureText("You").width + 0.26 * s;
+  const w = context.measureText(you).width + 0.26 * s;
   context.beginPath();
   context.roundRect(mx - w / 2, my - 0.2 * s, w, 0.34 * s, 0.17 * s);
   context.moveTo(mx - 0.1 * s, my + 0.13 * s);
@@ -151,5 +152,5 @@ function pointer(context, [x = 0, y = 0], s, now, quiet) {
   context.fillStyle = "#2b1a10";
   context.fill();
   context.fillStyle = "#fff";
-  context.fillText("You", mx, my - 0.02 * s);
+  context.fillText(you, mx, my - 0.02 * s);
 }

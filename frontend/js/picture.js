@@ -57,7 +57,7 @@ function redraw(figure, images) {
   draw(context, boardFrom({
     type: "keyframe", phase: "waiting", tick: 99, horizon: 99, tick_ms: 150, seat: 0, hats, grid, cook_time: 20, chefs,
     things: [], pots, score: 0, goal: null, round: 1, of: 1, tutorial: false, orders: null,
-  }), sprites, kitchen, 0);
+  }, document.body.dataset.you ?? ""), sprites, kitchen, 0);
   canvas.className = "kitchen-canvas";
   canvas.setAttribute("role", "img");
   canvas.setAttribute("aria-label", tiles.getAttribute("aria-label") ?? "");

@@ -58,7 +58,7 @@ class Round {
 
   /** @param {Keyframe} frame */
   start(frame) {
-    this.board = boardFrom(frame);
+    this.board = boardFrom(frame, document.body.dataset.you ?? "");
     this.view.show(this.board);
     this.hud.update(this.board);
     this.root.classList.add("drawn");

@@ -10,7 +10,7 @@ export function layLine(box) {
   const line = document.createElement("input");
   Object.assign(line, { type: "range", min, max, step, className: "line-input" });
   line.setAttribute("aria-label", field.getAttribute("aria-label") ?? "");
-  const told = document.createElement("p");
+  const told = document.createElement("span");
   Object.assign(told, { className: "slider-told" });
   const wrong = field.getAttribute("aria-describedby");
   if (wrong) line.setAttribute("aria-describedby", wrong);
@@ -42,5 +42,7 @@ export function layLine(box) {
   show(field.value);
   field.type = "hidden";
   field.closest(".line")?.classList.add("replaced");
-  box.prepend(line, told);
+  box.prepend(line);
+  const ends = box.querySelector(".ends");
+  ends?.insertBefore(told, ends.lastElementChild);
 }

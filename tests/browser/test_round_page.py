@@ -34,12 +34,12 @@ def server(page: Page) -> Server:
     return played
 
 
-def playing(server: Server) -> None:
+def playing(server: Server, **changes: object) -> None:
     """Press Start and let the countdown pass."""
     expect(server.page.locator("[data-part=card-button]")).to_be_focused()
     server.page.keyboard.press("Enter")
     server.wait_for("ready")
-    server.say({"type": "countdown", "seconds": 3}, KEYFRAME | {"phase": "playing"}, tick(1))
+    server.say({"type": "countdown", "seconds": 3}, KEYFRAME | {"phase": "playing"} | changes, tick(1))
     expect(server.page.locator("[data-part=over]")).to_be_hidden()
 
 
@@ -151,3 +151,83 @@ def test_the_end_leads_on_but_not_by_a_key_still_pressed(server: Server, page: P
     expect(page.locator("[data-part=card-button]")).to_be_enabled()
     page.keyboard.press("Space")
     page.wait_for_url(f"{HOST}/v/token")
+
+
+def open_round(page: Page, keyframe: dict[str, object], **values: object) -> Server:
+    """A round's page with other settings than usual, at its first card."""
+    pages: dict[str, Callable[[], str]] = {"/round": lambda: render("round.html", skippable=False, **values)}
+    server = Server(page, pages)
+    page.goto(f"{HOST}/round")
+    server.wait_for("hello")
+    server.say(KEYFRAME | keyframe)
+    return server
+
+
+def test_a_human_round_waits_for_both_and_says_when_the_other_is_away(page: Page) -> None:
+    server = open_round(page, {"partner": "human"}, partner="human")
+    expect(page.locator("[data-part=card-details]")).to_contain_text(
+        "Another participant wears the orange hat."
+    )
+    page.locator("[data-part=card-button]").click()
+    title = page.locator("[data-part=card-title]")
+    expect(title).to_have_text("Waiting for the other participant …")
+    server.say({"type": "countdown", "seconds": 3})
+    expect(title).to_have_text("3")
+    server.say(KEYFRAME | {"phase": "playing", "partner": "human"}, tick(1))
+    server.say({"type": "paused", "reason": "partner", "seconds_left": 30})
+    expect(title).to_have_text("Your partner's connection is lost")
+    expect(page.locator("[data-part=card-button]")).to_be_hidden()
+    server.say({"type": "ended", "outcome": "partner_left", "score": 0, "next": "/v/token"})
+    expect(title).to_have_text("Your partner has left")
+
+
+def test_games_of_a_round_are_counted_and_add_up(page: Page) -> None:
+    server = open_round(page, {}, episodes=2, bonus={"amount": 0.5, "unit": "EUR"})
+    playing(server, episodes=2)
+    expect(page.locator("[data-part=episode]")).to_have_text("Game 1 of 2")
+    server.say(
+        tick(400, score=40), KEYFRAME | {"phase": "countdown", "episode": 2, "episodes": 2, "score": 40}
+    )
+    server.say({"type": "countdown", "seconds": 2})
+    expect(page.locator("[data-part=card-text]")).to_have_text("Game 2 of 2")
+    expect(page.locator("[data-part=episode]")).to_have_text("Game 2 of 2")
+    expect(page.locator("[data-part=score]")).to_have_text("40")
+    server.say(tick(400, score=60), {"type": "ended", "outcome": "finished", "score": 60, "next": "/v/token"})
+    told = "Soups served: 3. Points: 60. You earned the bonus: 0.5 EUR."
+    expect(page.locator("[data-part=card-text]")).to_have_text(told)
+
+
+@pytest.mark.parametrize(
+    ("shown", "told"),
+    [("after", "Soups served: 2. Points: 20. The goal was 40."), ("never", "Go on when you are ready.")],
+)
+def test_a_score_is_told_when_it_may_be(page: Page, shown: str, told: str) -> None:
+    server = open_round(page, {}, show_score=shown)
+    playing(server, show_score=shown, points=10)
+    delivery = ["delivery", 0, "onion_soup", "serving", 3, 3]
+    server.say(tick(200, score=20, events=[delivery]))
+    expect(page.locator("[data-part=time]")).to_have_text("0:30")
+    assert "20" not in page.locator(".hud").inner_text()
+    server.say({"type": "ended", "outcome": "finished", "score": 20, "next": "/v/token"})
+    expect(page.locator("[data-part=card-text]")).to_have_text(told)
+
+
+def test_whoever_cooks_alone_sees_one_cook(page: Page) -> None:
+    server = open_round(page, {"partner": "none"}, partner="none", partner_hat=None)
+    expect(page.locator("[data-part=card-details]")).to_contain_text("You cook alone")
+    expect(page.locator("canvas")).to_be_visible()
+    look = "() => document.querySelector('canvas').toDataURL()"
+    page.emulate_media(reduced_motion="reduce")
+    server.say(KEYFRAME | {"partner": "none", "phase": "playing", "tick": 300})
+    page.wait_for_timeout(150)
+    alone = page.evaluate(look)
+    server.say(
+        KEYFRAME | {"partner": "none", "phase": "playing", "tick": 300, "chefs": [[1, 2, 0, 0], [2, 1, 0, 0]]}
+    )
+    page.wait_for_timeout(150)
+    assert page.evaluate(look) == alone
+
+
+def test_the_round_speaks_chinese(page: Page) -> None:
+    open_round(page, {}, language="zh")
+    expect(page.locator("[data-part=card-button]")).to_have_text("开始")
