@@ -9,6 +9,7 @@ from galley.errors import GalleyError
 from galley.kitchen.codes import (
     COUNTER,
     DISH_DISPENSER,
+    INGREDIENTS_PER_SOUP,
     ONION_DISPENSER,
     POT,
     SERVING,
@@ -69,17 +70,18 @@ def brain(layout: Layout, seat: int, team: bool = False) -> Brain:
     """
     known = distances(layout)
     require_solvable(known)
+    pots = int((known.reachable.any(axis=0) & (layout.tiles.ravel() == POT)).sum())
     robot_takes, human_takes = durations(known, seat), durations(known, 1 - seat)
     needed = [
         (AT_POT, TAKE_INGREDIENT), (AT_POT, TAKE_A_DISH), (WITH_INGREDIENT, FILL_POT), (WITH_DISH, FETCH_SOUP),
         (WITH_SOUP, SERVE),
     ]  # fmt: skip
+    _add_cooking(layout.rules.cook_time_ticks, pots, robot_takes, human_takes)
     passes = any(takes[one] >= UNABLE for takes in (robot_takes, human_takes) for one in needed)
     longest = max(takes[takes < UNABLE].max(initial=1.0) for takes in (robot_takes, human_takes))
     unit = max(1.0, float(longest) / (LEFTS - 1))
     robot_next = np.zeros((STANDS, TASKS, LEFTS, WORLDS), dtype=np.float32)
     human_next = np.zeros((TASKS, LEFTS, STANDS, WORLDS), dtype=np.float32)
-    pots = int((known.reachable.any(axis=0) & (layout.tiles.ravel() == POT)).sum())
     if not passes:
         sweeps = iterate(robot_takes, human_takes, pots, unit, robot_next, human_next, team)
         if sweeps >= MOST_SWEEPS:
@@ -104,8 +106,7 @@ def durations(known: Distances, seat: int) -> NDArray[np.float64]:
     """float64[STANDS, TASKS]: the ticks each subtask takes from each stand, `UNABLE` where it cannot be done.
 
     A mean over the poses at which the stand's stations are faced, of the way to the nearest station of the
-    subtask, and one tick to interact. To fetch a soup takes at least what remains of its cooking if a
-    dish was taken at once.
+    subtask, and one tick to interact; cooking is left out.
     """
     layout = known.layout
     tiles = layout.tiles.ravel()
@@ -119,10 +120,23 @@ def durations(known: Distances, seat: int) -> NDArray[np.float64]:
             ways = np.where(ways < 0, np.int16(UNABLE), ways)
             if ways.size and ways.min() < UNABLE:
                 found[stand, task] = ways.min(axis=1).mean() + 1
-    cooking = layout.rules.cook_time_ticks - found[AT_POT, TAKE_A_DISH]
-    if found[AT_POT, TAKE_A_DISH] < UNABLE and found[WITH_DISH, FETCH_SOUP] < UNABLE:
-        found[WITH_DISH, FETCH_SOUP] = max(found[WITH_DISH, FETCH_SOUP], cooking)
     return found
+
+
+def _add_cooking(cook_time: int, pots: int, *teams: NDArray[np.float64]) -> None:
+    """Nothing; lengthens the fetching of a soup by what is likely left of its cooking.
+
+    That is what remains when a dish was taken at once, less the time in which the quicker chef fills the
+    other pots meanwhile: who has several pots to serve seldom waits at one.
+    """
+    filling = min(
+        INGREDIENTS_PER_SOUP * float(takes[AT_POT, TAKE_INGREDIENT] + takes[WITH_INGREDIENT, FILL_POT])
+        for takes in teams
+    )
+    for takes in teams:
+        if takes[AT_POT, TAKE_A_DISH] < UNABLE and takes[WITH_DISH, FETCH_SOUP] < UNABLE:
+            left = cook_time - float(takes[AT_POT, TAKE_A_DISH]) - (pots - 1) * filling
+            takes[WITH_DISH, FETCH_SOUP] = max(takes[WITH_DISH, FETCH_SOUP], left)
 
 
 def _own_poses(known: Distances, start: int) -> NDArray[np.bool_]:

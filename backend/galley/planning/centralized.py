@@ -16,6 +16,8 @@ from galley.planning.team_kernel import LEG_TICKS, Search, search_plan
 
 ORDERS_AHEAD = 3
 """Orders planned for at a time when there is no order list."""
+BEYOND = 3
+"""Orders after those whose likely cost counts, so that a plan leaves the kitchen prepared."""
 WIDTH = 24
 """Nodes kept per tick in the search for a plan from the start or after one has been carried out."""
 WIDTH_AFRESH = 3
@@ -63,11 +65,13 @@ class TeamPlanner:
         """
         listed = self.layout.rules.orders
         left = None if listed is None else len(listed) - int(state[ORDERS_DELIVERED])
-        wanted = (ORDERS_AHEAD if left is None else left) if orders is None else orders
+        known = ORDERS_AHEAD + BEYOND if left is None else left
+        wanted = min(known, ORDERS_AHEAD) if orders is None else orders
         if wanted < 1 or width < 1 or most_ticks < 1:
             raise GalleyError("a plan needs at least one order, one node a tick and one tick")
+        beyond = max(0, min(BEYOND, known - wanted))
         search = self._search(width, most_ticks)
-        node, complete = search_plan(self._brain, search, state, wanted, PAIRS)
+        node, complete = search_plan(self._brain, search, state, wanted, beyond, PAIRS)
         legs = []
         while search.parents[node] >= 0:
             legs.append(search.legs[node, : search.lengths[node]])

@@ -56,10 +56,14 @@ from galley.planning.subtask_kernel import (
     _add,
     _sources,
 )
-from galley.planning.value_kernel import IDLE, MOST_ORDERS, both_busy, world
+from galley.planning.value_kernel import MOST_ORDERS, both_busy
 
 LEG_TICKS = 96
 """The most ticks from one decision to the next interaction."""
+STRANDED_TICKS = 500.0
+"""The cost to go of a state in which neither chef has anything to do."""
+LATER_TICKS = 10
+"""How much later a plan may end than the first one found if the kitchen is then better prepared."""
 STAGE_TICKS = 3.5
 """What a step on a thing's way from dispenser to pot is taken to cost where things pass over counters."""
 
@@ -121,6 +125,8 @@ def team_options(
             soups += count == INGREDIENTS_PER_SOUP
             begun += count > 0
             for kind in (ONION, TOMATO):
+                if count == INGREDIENTS_PER_SOUP:
+                    packed = 0  # the next soup's ingredients may be taken ahead
                 room[kind] += _room(packed, wanted, kind, any_order)
         elif tile == COUNTER and packed > SOUP_OF_KIND:
             soups += 1
@@ -146,8 +152,11 @@ def team_options(
         elif held > DISH:
             if tile == SERVING and (any_order or _open_order(spec, state, 0) == held - SOUP_OF_KIND):
                 _add(out, DELIVER, cell, costs)
-        elif tile == POT and _room(packed, wanted, held, any_order) > 0:
-            _add(out, FILL, cell, costs)
+        elif tile == POT:
+            if packed // POT_COUNT % POT_COUNT == INGREDIENTS_PER_SOUP:
+                packed = 0  # who is early waits beside it
+            if _room(packed, wanted, held, any_order) > 0:
+                _add(out, FILL, cell, costs)
     _pass_counters(brain, state, seat, out, summed)
     if out[DROP, 0] == 0:
         for cell in range(costs.size):
@@ -157,8 +166,20 @@ def team_options(
 
 @kernel
 def _left(brain: Brain, state: NDArray[int16], seat: int, cell: int) -> float:
-    """The ticks that a chef alone needs to interact with the tile at `cell`."""
-    return float(max(_alone(brain, state, seat, cell), _cooks_for(brain, state, cell)) + 1)
+    """The ticks that a chef alone needs to do something useful with the tile at `cell`."""
+    wait = _cooks_for(brain, state, cell)
+    if _must_wait(brain, state, seat, cell):
+        wait += 1
+    return float(max(_alone(brain, state, seat, cell), wait) + 1)
+
+
+@kernel
+def _must_wait(brain: Brain, state: NDArray[int16], seat: int, cell: int) -> bool:
+    """Whether interacting with the tile does nothing yet: a soup still cooks, or a pot is still full."""
+    packed = state[CELLS + cell]
+    if brain.spec[SPEC_TILES + cell] != POT or packed // POT_COUNT % POT_COUNT < INGREDIENTS_PER_SOUP:
+        return False
+    return state[CHEF * seat + HELD] != DISH or _cooks_for(brain, state, cell) > 0
 
 
 @kernel
@@ -231,9 +252,11 @@ def _stages(brain: Brain, state: NDArray[int16], orders: int) -> float:
 
 @kernel
 def to_go(
-    brain: Brain, state: NDArray[int16], orders: int, options: NDArray[int16], summed: NDArray[int16]
-) -> float:
-    """The estimated ticks until `orders` more soups are served; `options` int16[2, KINDS, 4] is filled."""
+    brain: Brain, state: NDArray[int16], orders: int, beyond: int, options: NDArray[int16],
+    summed: NDArray[int16],
+) -> float:  # fmt: skip
+    """The estimated ticks until `orders` and `beyond` more soups are served; fills `options` int16[2, KINDS, 4]."""
+    orders += beyond
     team_options(brain, state, 0, orders, options[0], summed)
     team_options(brain, state, 1, orders, options[1], summed)
     if brain.pots[1]:
@@ -249,7 +272,7 @@ def to_go(
                 brain, state, orders, kind0, options[0, kind0, 1], kind1, options[1, kind1, 1], 0
             )
             best = min(best, cost)
-    return best if best < np.inf else 500.0
+    return best if best < np.inf else STRANDED_TICKS
 
 
 @kernel
@@ -287,8 +310,8 @@ def walk(
     for tick in range(LEG_TICKS):
         at0 = not wait0 and _alone(brain, state, 0, cell0) == 0
         at1 = not wait1 and _alone(brain, state, 1, cell1) == 0
-        does0 = at0 and _cooks_for(brain, state, cell0) == 0
-        does1 = at1 and _cooks_for(brain, state, cell1) == 0
+        does0 = at0 and not _must_wait(brain, state, 0, cell0)
+        does1 = at1 and not _must_wait(brain, state, 1, cell1)
         pose0, pose1 = _pose(brain, state, 0), _pose(brain, state, 1)
         way = first
         blocked = joint_cost(brain.joint, goal0, goal1, pose0, pose1) >= FAR
@@ -367,9 +390,11 @@ def _place(search: Search, tick: int, total: float) -> int:
 
 @kernel
 def search_plan(
-    brain: Brain, search: Search, start: NDArray[int16], orders: int, pairs: int
+    brain: Brain, search: Search, start: NDArray[int16], orders: int, beyond: int, pairs: int
 ) -> tuple[int, bool]:
     """(node, whether it is the end): the last node of the best plan for `orders` more soups from `start`.
+
+    With `beyond` more orders to follow the plan is the one after which those are likely to be served soonest.
 
     Of each node the `pairs` most promising pairs of subtasks are tried, in three ways each. When the beam
     runs out of ticks the node of the best estimate is given, and False.
@@ -394,10 +419,11 @@ def search_plan(
     search.lengths[0] = 0
     search.totals[0] = 0
     best_end = -1
+    first_end = 0
     best_node = 0
     best_left = np.inf
     for tick in range(ticks):
-        if best_end >= 0:
+        if best_end >= 0 and (beyond == 0 or tick > first_end + LATER_TICKS):
             break
         for place in range(search.counts[tick]):
             node = tick * width + place
@@ -405,13 +431,16 @@ def search_plan(
             left = orders - (now[DELIVERIES] - served)
             if left <= 0 or finished(brain.spec, now):
                 if best_end < 0:
+                    first_end = tick
+                    best_end = node
+                elif search.totals[node] < search.totals[best_end]:
                     best_end = node
                 continue
             if tick > 0 and search.totals[node] - tick < best_left:
                 best_left = search.totals[node] - tick
                 best_node = node
-            to_go(brain, now, left, options, summed)
-            found = _rate_pairs(brain, now, left, options, rated, which, summed, ahead)
+            to_go(brain, now, left, beyond, options, summed)
+            found = _rate_pairs(brain, now, left + beyond, options, rated, which, summed, ahead)
             order = np.argsort(rated[:found])
             for index in range(min(pairs, found)):
                 pick = which[order[index]]
@@ -427,10 +456,10 @@ def search_plan(
                         continue
                     if _met_before(search, _key(state), then):
                         continue
-                    still = orders - (state[DELIVERIES] - served)
+                    still = max(0, orders - (state[DELIVERIES] - served))
                     total = float(then)
-                    if still > 0:
-                        total += to_go(brain, state, still, ahead, summed)
+                    if still + beyond > 0:
+                        total += to_go(brain, state, still, beyond, ahead, summed)
                     new = _place(search, then, total)
                     if new >= 0:
                         search.states[new] = state

@@ -38,7 +38,7 @@ STANDS = 5
 
 MOST_FULL = 2
 """Soups cooking or ready that are told apart; more count as this many."""
-MOST_ORDERS = 3
+MOST_ORDERS = 6
 """Orders that costs to go look ahead."""
 LEFTS = 16
 """Steps of the time that a subtask still takes."""
@@ -92,17 +92,18 @@ def done(task: int, at: int, pots: int) -> tuple[int, int]:
 
 @kernel
 def sensible(stand: int, task: int, at: int, pots: int, other: int, team: bool) -> bool:
-    """Whether a subtask makes sense at a stand while the other chef is at `other`; a team fetches dishes ahead."""
+    """Whether a subtask makes sense at a stand while the other chef is at `other`; a team takes things ahead."""
     full = at // MOST_ORDERS % (MOST_FULL + 1)
     count = at // MOST_ORDERS // (MOST_FULL + 1)
     if stand == WITH_SOUP:
         return task == SERVE
     if stand == WITH_INGREDIENT:
-        return task == (FILL_POT if count > 0 or full < pots else PUT_DOWN)
+        room = count > 0 or full < pots
+        return task == FILL_POT if room else task == PUT_DOWN or (team and task == FILL_POT)
     if stand == WITH_DISH:
         return task == FETCH_SOUP if full > 0 else task == PUT_DOWN or (team and task == FETCH_SOUP)
     if task == TAKE_INGREDIENT:
-        return count > 0 or full < pots
+        return count > 0 or full < pots or team
     return task == TAKE_A_DISH and full + (team and count > 0) > (other == FETCH_SOUP)
 
 
