@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import shutil
+import subprocess
 import sys
 import tempfile
 from dataclasses import dataclass
@@ -43,6 +44,12 @@ DOWNLOADS = {
         "human-data.csv",
         "text/csv",
     ),
+    "human-data-parquet": Download(
+        "Human data, Parquet",
+        "The same as Parquet.",
+        "human-data.parquet",
+        "application/vnd.apache.parquet",
+    ),
 }
 
 
@@ -64,7 +71,7 @@ class DownloadPages:
             out = folder / f"out.{download.ending}"
             tests = bool(request.query_params.get("tests"))
             async with self._turns:
-                problem = await _in_a_process(self._desk.database, study, kind, tests, out)
+                problem = await asyncio.to_thread(_in_a_process, self._desk.database, study, kind, tests, out)
         except BaseException:
             await asyncio.to_thread(shutil.rmtree, folder, ignore_errors=True)
             raise
@@ -81,25 +88,14 @@ class DownloadPages:
         )
 
 
-async def _in_a_process(database: str, study: str, kind: str, tests: bool, out: Path) -> str:
+def _in_a_process(database: str, study: str, kind: str, tests: bool, out: Path) -> str:
     """Empty once the file is written, else what went wrong. The database's URL travels on standard input:
     command lines are for everybody on the machine to read.
     """
-    process = await asyncio.create_subprocess_exec(
-        sys.executable,
-        "-m",
-        "galley.server.admin.exporting",
-        stdin=asyncio.subprocess.PIPE,
-        stdout=asyncio.subprocess.DEVNULL,
-        stderr=asyncio.subprocess.PIPE,
-    )
     job = {"database": database, "study": study, "kind": kind, "tests": tests, "out": str(out)}
-    try:
-        _, told = await process.communicate(json.dumps(job).encode())
-    except asyncio.CancelledError:
-        process.kill()
-        raise
-    if process.returncode == 0:
+    command = [sys.executable, "-m", "galley.server.admin.exporting"]
+    done = subprocess.run(command, input=json.dumps(job), capture_output=True, text=True, check=False)  # noqa: S603
+    if done.returncode == 0:
         return ""
-    lines = told.decode(errors="replace").strip().splitlines()
+    lines = done.stderr.strip().splitlines()
     return lines[-1] if lines else "The export stopped without saying why."
