@@ -174,6 +174,8 @@ def _bare(annotation: Any) -> Any:
 
 def _tags(member: Any) -> list[Any]:
     """The literal values by which a union tells its members apart, and the member's own name."""
+    if get_origin(member) in (list, tuple):
+        return ["list"]
     if not (isinstance(member, type) and issubclass(member, pydantic.BaseModel)):
         return []
     literals = (field.annotation for field in member.model_fields.values())

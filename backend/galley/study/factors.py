@@ -5,7 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Final, Literal, Self
 
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 from galley.files import FileModel, Loc, faults
 from galley.names import name_fix
@@ -122,11 +130,12 @@ class Condition(FileModel):
         )
 
 
-def _as_list(value: Any) -> Any:
-    return [value] if isinstance(value, dict) else value
+def _one_or_many(value: Any) -> str:
+    return "list" if isinstance(value, (list, tuple)) else "Condition"
 
 
 Conditions = Annotated[
-    tuple[Condition, ...], BeforeValidator(_as_list, json_schema_input_type=Condition | tuple[Condition, ...])
+    Annotated[Condition, Tag("Condition")] | Annotated[tuple[Condition, ...], Tag("list")],
+    Discriminator(_one_or_many),
 ]
 """One condition, or a list of them that must all hold."""

@@ -10,6 +10,7 @@ from pydantic import Field, field_validator, model_validator
 from galley.files import FileModel, Loc, faults
 from galley.study.counterbalance import MOST_SEQUENCES, permutations_count, sequences
 from galley.study.factors import (
+    Condition,
     Conditions,
     LayoutName,
     Order,
@@ -115,8 +116,15 @@ class ScreenOut(_Stage):
     """Ends the visit of those who meet its condition."""
 
     kind: Literal["screen_out"]
-    when: Conditions = Field(min_length=1)
+    when: Conditions
     """Whom the visit ends for."""
+
+    @model_validator(mode="after")
+    def _not_everybody(self) -> Self:
+        if not conditions_of(self):
+            fix = "add a condition, such as `{item: survey.age, at_most: 17}`"
+            raise faults([(("when",), "this ends the visit of everybody who comes here", fix)])
+        return self
 
 
 class Tutorial(_Stage):
@@ -337,9 +345,10 @@ Stage = Annotated[
 ]
 
 
-def conditions_of(stage: Any) -> Conditions:
+def conditions_of(stage: Any) -> tuple[Condition, ...]:
     """The conditions of a stage; consent and debrief have none."""
-    return getattr(stage, "when", ())
+    when = getattr(stage, "when", ())
+    return (when,) if isinstance(when, Condition) else tuple(when)
 
 
 def stage_ids(stages: tuple[Stage, ...]) -> tuple[str, ...]:
