@@ -78,11 +78,13 @@ class Served:
 
 
 @contextmanager
-def serving(workspace: Workspace, database: Path, **settings: Any) -> Iterator[Served]:
+def serving(
+    workspace: Workspace, database: Path | str, *, preview: bool = False, **settings: Any
+) -> Iterator[Served]:
     """A server for a workspace on a free port, until the block ends."""
     chosen = Settings(port=0, **settings)
     with Store.open(database, serving=True) as store:
-        app = create_app(workspace, store, chosen)
+        app = create_app(workspace, store, chosen, preview=preview)
         listening = listen(chosen)
         server = uvicorn.Server(server_config(app, chosen))
         thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]})
@@ -111,8 +113,12 @@ def good_answers(questionnaire: Questionnaire) -> dict[str, str | list[str]]:
     answers: dict[str, str | list[str]] = {}
     for item in questionnaire.items:
         match item.kind:
-            case "likert" | "comparison":
+            case "likert" | "comparison" | "semantic_differential":
                 answers[item.id] = "2"
+            case "slider":
+                answers[item.id] = str(item.max)
+            case "ranking":
+                answers |= {f"{item.id}.{o.value}": str(n) for n, o in enumerate(item.options, 1)}
             case "single_choice":
                 answers[item.id] = item.options[0].value
             case "multiple_choice":
@@ -127,10 +133,10 @@ def good_answers(questionnaire: Questionnaire) -> dict[str, str | list[str]]:
 class Participant:
     """One visit, walked page by page."""
 
-    def __init__(self, served: Served, study: str = "mine", query: str = "") -> None:
+    def __init__(self, served: Served, study: str = "mine", query: str = "", **fields: str) -> None:
         self.served = served
         self.http = served.client()
-        self.page = self.http.post(f"/s/{study}/begin{query}")
+        self.page = self.http.post(f"/s/{study}/begin{query}", data=fields)
         self.path = self.page.url.path
         self.token = self.path.rsplit("/", 1)[1]
 

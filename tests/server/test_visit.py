@@ -113,14 +113,14 @@ def test_a_whole_visit_from_the_landing_page_to_the_completion_code(served: Serv
     assert len(left) == 10
 
 
-def test_declining_ends_the_visit_with_a_plain_page(served: Served) -> None:
+def test_declining_ends_the_visit(served: Served) -> None:
     person = Participant(served)
     page = person.submit({"choice": "decline"})
-    assert (page.status_code, person.stage) == (200, "plain")
+    assert (page.status_code, person.stage) == (200, "ending")
     assert person.submit({"choice": "agree"}, step="consent").text == page.text
     row = served.store.visit(person.token).result()
     assert row is not None
-    assert row.status == "declined"
+    assert (row.status, row.consent_sha256) == ("declined", None)
 
 
 def test_consent_without_a_choice_changes_nothing(served: Served) -> None:

@@ -7,7 +7,28 @@ from typing import Annotated
 
 import typer
 
+from galley.commands.options import WorkspaceArgument
+
 app = typer.Typer(help="Help with writing studies.", no_args_is_help=True, rich_markup_mode=None)
+
+
+@app.command()
+def preview(
+    study: Annotated[str, typer.Argument(metavar="STUDY", help="The study to walk through.")],
+    workspace: WorkspaceArgument = Path(),
+    host: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Address to listen on.", show_default="127.0.0.1"),
+    ] = None,
+    port: Annotated[
+        int | None,
+        typer.Option(min=0, max=65535, help="Port to listen on; 0 takes a free one.", show_default="8000"),
+    ] = None,
+) -> None:
+    """Serve a study to walk through it: nothing of it is kept, and no place of the design is taken."""
+    from galley.server.run import preview as run
+
+    run(workspace, study=study, host=host, port=port)
 
 
 @app.command()

@@ -5,9 +5,10 @@ from __future__ import annotations
 import asyncio
 import gc
 import logging
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Iterator, Mapping
 from contextlib import asynccontextmanager
 from pathlib import Path
+from typing import Any
 
 from fastapi import FastAPI, Request
 from fastapi.responses import Response
@@ -16,38 +17,47 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
 from galley.agents.catalogue import Catalogue
+from galley.agents.protocol import Agent
 from galley.errors import GalleyError
-from galley.kitchen import Kitchen, Layout, warm
+from galley.kitchen import STAY, Kitchen, Layout, warm
 from galley.kitchen.layout_file import load_layouts
 from galley.records import Store
 from galley.server.admin.pages import researcher_pages
 from galley.server.clock import Clock
 from galley.server.matches import Matches, round_layout
 from galley.server.origin import HEADERS, SecureHeaders
-from galley.server.pages import NO_PAGE, Pages, templates
+from galley.server.pages import NO_PAGE, NOT_FOUND, Pages, templates
 from galley.server.play import Play
 from galley.server.settings import Settings
 from galley.server.thinking import Thinking
 from galley.server.visits import Visits
+from galley.study.assignment import cells
 from galley.study.plan import plan_visit, visit_seed
 from galley.study.study import Study, load_study
+from galley.translations import Catalogues, mark
 from galley.workspace import Workspace
 
 LOG = logging.getLogger(__name__)
 STATIC_KEPT_S = 300
 REHEARSED_TICKS = 3
+REHEARSED_VISITS = 64
+REHEARSED_PER_CELL = 8
+NO_AGENTS = (None, "exit", "go_on", "end_round")
 
-BROKEN = (
+WRONG = mark("Something went wrong")
+NOT_POSSIBLE = mark("Not possible")
+BROKEN = mark(
     "Something went wrong here, not with you. What you answered so far is stored. "
     "Please load this page again in a moment; you will be where you were."
 )
+AWAY_RETRY_S = "5"
 
 
-def create_app(workspace: Workspace, store: Store, settings: Settings) -> FastAPI:
+def create_app(workspace: Workspace, store: Store, settings: Settings, *, preview: bool = False) -> FastAPI:
     """The application that serves a workspace's studies (or the one that the settings name) into a store.
 
-    Kernels are compiled and every agent that a study needs is tried here, so that nothing is left to the
-    first round.
+    With `preview` every visit is a test. Kernels are compiled and every agent that a study needs is tried
+    here, so that nothing is left to the first round.
 
     Raises: GalleyError or InvalidFiles when a study or an agent it needs cannot be used.
     """
@@ -59,11 +69,12 @@ def create_app(workspace: Workspace, store: Store, settings: Settings) -> FastAP
 
     clock = Clock()
     thinking = Thinking(settings.think_window_ms / 1000.0)
-    visits = Visits(store, studies, clock)
+    catalogues = Catalogues.load()
+    visits = Visits(store, studies, clock, catalogues, preview=preview)
     matches = Matches(store, visits, catalogue, layouts, thinking, clock)
     frontend = frontend_folder()
-    environment = templates(str(frontend / "templates"))
-    pages = Pages(studies, visits, matches, store, environment, settings.max_form_kib * 1024)
+    environment = templates(str(frontend / "templates"), catalogues)
+    pages = Pages(studies, visits, matches, store, clock, environment, settings.max_form_kib * 1024)
     play = Play(visits, matches, settings.messages_per_s)
 
     @asynccontextmanager
@@ -98,15 +109,22 @@ def create_app(workspace: Workspace, store: Store, settings: Settings) -> FastAP
 
     async def not_here(_request: Request, error: Exception) -> Response:
         status = error.status_code if isinstance(error, HTTPException) else 404
-        return pages.plain(status, "Not found" if status == 404 else "Not possible", NO_PAGE)
+        return pages.plain(status, NOT_FOUND if status == 404 else NOT_POSSIBLE, NO_PAGE)
+
+    async def away(_request: Request, error: Exception) -> Response:
+        LOG.error("a page could not be served: %s", error)
+        response = pages.plain(503, WRONG, BROKEN)
+        response.headers["retry-after"] = AWAY_RETRY_S
+        return response
 
     async def broken(_request: Request, _error: Exception) -> Response:
-        response = pages.plain(500, "Something went wrong", BROKEN)
+        response = pages.plain(500, WRONG, BROKEN)
         # This page is made outside of the middleware.
         response.headers.update(HEADERS)
         return response
 
     app.add_exception_handler(HTTPException, not_here)
+    app.add_exception_handler(GalleyError, away)
     app.add_exception_handler(Exception, broken)
     return app
 
@@ -149,34 +167,47 @@ def _rehearse(studies: Mapping[str, Study], layouts: Mapping[str, Layout], catal
 
     Raises: GalleyError naming agent and layout when one cannot.
     """
-    rehearsed = set()
-    for study in studies.values():
-        # One plan has them all: visits differ in order, seats and colours only.
-        for step in plan_visit(study, visit_seed(study, 0), 0).steps:
-            if step.kind != "round":
-                continue
-            layout = round_layout(layouts, step.data)
-            name = step.data["agent"]
-            if (name, layout) in rehearsed:
-                continue
-            rehearsed.add((name, layout))
-            bundle = catalogue.bundle(name)
-            try:
-                for seat in (0, 1):
-                    agent = bundle.make()
-                    agent.reset(layout, seat, 0)
-                    kitchen = Kitchen(layout)
-                    for tick in range(min(REHEARSED_TICKS, layout.rules.horizon_ticks)):
-                        before = kitchen.state.copy()
-                        action = agent.act(before, tick)
-                        joint = (action, 4) if seat == 0 else (4, action)
-                        kitchen.step(*joint)
-                        agent.observe(before, joint)
-            except GalleyError:
-                raise
-            except Exception as error:
-                raise GalleyError(
-                    f"agents/{name}: it cannot play on layout {layout.name} "
-                    f"({type(error).__name__}: {error}); "
-                    "run `galley agents check`"
-                ) from error
+    met = {
+        (name, round_layout(layouts, data))
+        for study in studies.values()
+        for data in _rounds(study)
+        for name in _agents_of(data)
+    }
+    for name, layout in sorted(met, key=lambda pair: (pair[0], pair[1].name)):
+        bundle = catalogue.bundle(name)
+        try:
+            for seat in (0, 1):
+                _few_ticks(bundle.make(), layout, seat)
+        except GalleyError:
+            raise
+        except Exception as error:
+            raise GalleyError(
+                f"agents/{name}: it cannot play on layout {layout.name} ({type(error).__name__}: {error}); "
+                "run `galley agents check`"
+            ) from error
+
+
+def _rounds(study: Study) -> Iterator[Mapping[str, Any]]:
+    """The settings of the rounds that visits meet: of some visits in each cell of the design."""
+    for number in range(min(REHEARSED_VISITS, REHEARSED_PER_CELL * len(cells(study.config)))):
+        for step in plan_visit(study, visit_seed(study, number), number).steps:
+            if step.kind == "round":
+                yield step.data
+
+
+def _agents_of(data: Mapping[str, Any]) -> set[str]:
+    """Every agent that may play a round, those that stand in for a person included."""
+    lobby = data.get("lobby", {})
+    names = {data["agent"], lobby.get("fallback"), lobby.get("dropout")}
+    return {name for name in names if name not in NO_AGENTS}
+
+
+def _few_ticks(agent: Agent, layout: Layout, seat: int) -> None:
+    agent.reset(layout, seat, 0)
+    kitchen = Kitchen(layout)
+    for tick in range(min(REHEARSED_TICKS, layout.rules.horizon_ticks)):
+        before = kitchen.state.copy()
+        action = agent.act(before, tick)
+        joint = (action, STAY) if seat == 0 else (STAY, action)
+        kitchen.step(*joint)
+        agent.observe(before, joint)

@@ -98,6 +98,16 @@ class Matches:
         await match.ended()
         return True
 
+    async def give_up(self, visit: Visit) -> None:
+        """End the round a visit is at, if it has begun, as abandoned: the visit's time is over."""
+        row = await asyncio.wrap_future(self._store.open_round(visit.row.id, visit.step.id))
+        if row is None or row.status != "open":
+            return
+        match = await self.of(visit)
+        if match is not None:
+            match.end("abandoned")
+            await match.ended()
+
     async def stop(self) -> None:
         """Stop every match for a shutdown: all that was played is journalled, rounds that are over closed."""
         for _, match in tuple(self._live.values()):

@@ -4,33 +4,62 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any
+from urllib.parse import urlencode
 
 import jinja2
 from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
 
 from galley.records import Store
+from galley.server.clock import Clock
 from galley.server.forms import FormError, read_form
 from galley.server.matches import Matches
 from galley.server.origin import same_origin
+from galley.server.step_pages import (
+    common_context,
+    ending_context,
+    public_study,
+    questionnaire_of,
+    step_context,
+)
 from galley.server.templates import templates as templates
-from galley.server.visits import Visit, Visits
+from galley.server.visits import GRACE_S, Visit, Visits
+from galley.study.languages import choose_language
 from galley.study.plan import Step
-from galley.study.progress import Agreed, Continued, Declined, Happening, Submitted
-from galley.study.questionnaire import Questionnaire, validate_answers
+from galley.study.progress import (
+    Agreed,
+    Continued,
+    Declined,
+    Ended,
+    Happening,
+    Skipped,
+    Submitted,
+    TimedOut,
+)
+from galley.study.questionnaire import validate_answers
 from galley.study.study import Study
+from galley.translations import language_name, mark
 
-MAX_LINK_PARAMS = 20
+MAX_LINK_PARAMS = 30
 MAX_LINK_PARAM_CHARS = 200
 NEVER_CACHED = {"cache-control": "no-store"}
+LANGUAGE_PARAM = "language"
 
-UNKNOWN_LINK = (
+NOT_FOUND = mark("Not found")
+NOT_USED = mark("Not used")
+UNKNOWN = mark("Unknown link")
+UNKNOWN_LINK = mark(
     "This link is not known here. Please check that it is complete, "
     "or begin again from the link you were sent."
 )
-DECLINED = "You chose not to take part. Nothing more is recorded, and you may close this page."
-NO_PAGE = "There is no page at this address. Please check that the link is complete."
-FOREIGN = "This form was sent from another site, so it was not used."
+NO_PAGE = mark("There is no page at this address. Please check that the link is complete.")
+FOREIGN = mark("This form was sent from another site, so it was not used.")
+UNREADABLE = mark("This form could not be read, so nothing was changed.")
+INVITED_ONLY = mark("By invitation")
+UNINVITED = mark(
+    "This study is for people who were invited. "
+    "Please use the whole link of your invitation, with the code at its end."
+)
 
 
 class Pages:
@@ -42,6 +71,7 @@ class Pages:
         visits: Visits,
         matches: Matches,
         store: Store,
+        clock: Clock,
         templates: jinja2.Environment,
         max_form_bytes: int,
     ) -> None:
@@ -49,6 +79,7 @@ class Pages:
         self._visits = visits
         self._matches = matches
         self._store = store
+        self._clock = clock
         self._templates = templates
         self._max_form_bytes = max_form_bytes
 
@@ -70,7 +101,7 @@ class Pages:
         """The study when there is one, else a list."""
         if len(self._studies) == 1:
             return RedirectResponse(f"/s/{next(iter(self._studies))}", 303)
-        return self._page("studies.html", studies=[_public_study(study) for study in self._studies.values()])
+        return self._page("studies.html", studies=[public_study(study) for study in self._studies.values()])
 
     async def health(self) -> Response:
         """Whether what happens reaches the database."""
@@ -79,31 +110,50 @@ class Pages:
         return JSONResponse(state, 200 if health.ok else 503, NEVER_CACHED)
 
     async def landing(self, request: Request, study: str) -> Response:
-        """What the study is and how long it takes, with a button to begin."""
+        """What the study is and how long it takes, with a button to begin; or why nobody can."""
         found = self._studies.get(study)
         if found is None:
-            return self.plain(404, "Not found", NO_PAGE)
-        query = f"?{request.url.query}" if request.url.query else ""
+            return self.plain(404, NOT_FOUND, NO_PAGE)
+        spoken = found.in_language(_language(found, request))
+        params = _link_params(request)
+        why = await self._visits.closed(found, params)
+        if why is not None:
+            return self._not_begun(spoken, why)
+        others = {name: value for name, value in params.items() if name != LANGUAGE_PARAM}
+        offered = [
+            {
+                "code": code,
+                "name": language_name(code),
+                "url": f"/s/{study}?{urlencode({**others, LANGUAGE_PARAM: code})}",
+            }
+            for code in found.languages
+        ]
         return self._page(
             "landing.html",
-            study=_public_study(found),
-            minutes=found.minutes,
-            action=f"/s/{study}/begin{query}",
+            study=public_study(spoken),
+            minutes=spoken.minutes,
+            action=f"/s/{study}/begin" + (f"?{urlencode(others)}" if others else ""),
+            language=spoken.language,
+            languages=offered,
         )
 
     async def begin(self, request: Request, study: str) -> Response:
-        """A new visit; the answer leads to its page."""
+        """A new visit, or the one that this person has; the answer leads to its page."""
         found = self._studies.get(study)
         if found is None:
-            return self.plain(404, "Not found", NO_PAGE)
+            return self.plain(404, NOT_FOUND, NO_PAGE)
         if not same_origin(request.headers):
-            return self.plain(403, "Not used", FOREIGN)
-        params = {
-            name[:MAX_LINK_PARAM_CHARS]: value[:MAX_LINK_PARAM_CHARS].replace("\0", "")
-            for name, value in list(request.query_params.items())[:MAX_LINK_PARAMS]
-        }
-        visit = await self._visits.begin(found, params)
-        return RedirectResponse(visit.url, 303, NEVER_CACHED)
+            return self.plain(403, NOT_USED, FOREIGN)
+        try:
+            form = await read_form(request, self._max_form_bytes)
+        except FormError as error:
+            return self.plain(error.status, NOT_USED, UNREADABLE)
+        chosen = form.get(LANGUAGE_PARAM, [""])[0]
+        language = chosen if chosen in found.languages else _language(found, request)
+        begun = await self._visits.begin(found, _link_params(request), language)
+        if not isinstance(begun, Visit):
+            return self._not_begun(found.in_language(language), begun)
+        return RedirectResponse(begun.url, 303, NEVER_CACHED)
 
     # ---- a visit -------------------------------------------------------------------------------------------
 
@@ -111,47 +161,88 @@ class Pages:
         """The page of the step that the visit is at."""
         visit = await self._visits.find(token)
         if visit is None:
-            return self.plain(404, "Unknown link", UNKNOWN_LINK)
-        if visit.progress.status == "declined":
-            return self.plain(200, "Thank you", DECLINED)
+            return self.plain(404, UNKNOWN, UNKNOWN_LINK)
+        overdue = self._visits.overdue(visit)
+        if overdue is not None:
+            await self._out_of_time(visit, overdue)
+            visit = await self._visits.find(token) or visit
+        if visit.progress.status not in ("active", "completed"):
+            return self._page("ending.html", **ending_context(visit))
         await self._visits.entered(visit)
         return self._step_page(visit)
 
     async def submit(self, request: Request, token: str) -> Response:
         """Move on by what the step's form says; a form of another step changes nothing."""
         if not same_origin(request.headers):
-            return self.plain(403, "Not used", FOREIGN)
+            return self.plain(403, NOT_USED, FOREIGN)
         visit = await self._visits.find(token)
         if visit is None:
-            return self.plain(404, "Unknown link", UNKNOWN_LINK)
+            return self.plain(404, UNKNOWN, UNKNOWN_LINK)
+        language = visit.row.language
         try:
             form = await read_form(request, self._max_form_bytes)
         except FormError as error:
-            return self.plain(error.status, "Not used", f"This form could not be read: {error}.")
+            return self.plain(error.status, NOT_USED, UNREADABLE, language)
         step = visit.step
         on = RedirectResponse(visit.url, 303, NEVER_CACHED)
-        if visit.progress.status != "active" or form.get("step", [""])[0] != step.id:
+        if not visit.active or form.get("step", [""])[0] != step.id:
             return on
-        if step.kind == "round":
-            if "skip" in form:
-                await self._matches.skip(visit)
-            return on
-        questionnaire = _questionnaire(visit)
-        answers: Mapping[str, Any] = {}
+        overdue = self._visits.overdue(visit, GRACE_S)
+        if overdue is not None:
+            await self._out_of_time(visit, overdue)
+        elif step.kind == "round":
+            await self._round_form(visit, form)
+        elif "skip" in form and step.skippable:
+            await self._visits.happened(visit, Skipped(step.id))
+        else:
+            return await self._answered(visit, form) or on
+        return on
+
+    async def _answered(self, visit: Visit, form: Mapping[str, list[str]]) -> Response | None:
+        """The page again when something is missing or it is too early; None once the form is used."""
+        step = visit.step
+        questionnaire = questionnaire_of(visit)
+        answers: Mapping[str, Any] | None = None
+        problems: Mapping[str, str] = {}
         if questionnaire is not None:
-            answers, problems = validate_answers(questionnaire, form)
-            if problems:
-                return self._step_page(visit, 422, form, problems)
+            answers, problems = validate_answers(questionnaire, form, self._visits.say(visit.row.language))
+        left_s = visit.seconds_left(self._clock.ms())
+        if problems and "time_up" in form and left_s is not None and left_s < GRACE_S:
+            await self._visits.happened(visit, TimedOut(step.id))
+            return None
+        # A page that counts the seconds itself may be a little ahead of this clock.
+        early = visit.wait_s(self._clock.ms()) > 1.0 and step.kind != "consent"
+        if problems or early:
+            return self._step_page(visit, 422, form, problems, early=early)
         happening = _happening(step, form)
         if happening is not None:
             await self._visits.happened(visit, happening, answers, questionnaire)
-        return on
+        return None
+
+    async def _round_form(self, visit: Visit, form: Mapping[str, list[str]]) -> None:
+        if "skip" in form:
+            await self._matches.skip(visit)
+
+    async def _out_of_time(self, visit: Visit, happening: Happening) -> None:
+        if isinstance(happening, Ended) and visit.step.kind == "round":
+            await self._matches.give_up(visit)
+            visit = await self._visits.find(visit.row.token) or visit
+            happening = Ended(visit.step.id, happening.outcome)
+        await self._visits.happened(visit, happening)
 
     # ---- rendering -----------------------------------------------------------------------------------------
 
-    def plain(self, status: int, title: str, message: str) -> Response:
-        """A page that only says something."""
-        return self._page("plain.html", status, title=title, message=message, status=status)
+    def plain(self, status: int, title: str, message: str, language: str = "en") -> Response:
+        """A page that only says something, a marked message in a language."""
+        say = self._visits.say(language)
+        return self._page(
+            "plain.html", status, title=say(title), message=say(message), status=status, language=language
+        )
+
+    def _not_begun(self, study: Study, why: str) -> Response:
+        if why == "uninvited":
+            return self.plain(403, INVITED_ONLY, UNINVITED, study.language)
+        return self._page("ending.html", study=public_study(study), language=study.language, outcome=why)
 
     def _step_page(
         self,
@@ -159,72 +250,44 @@ class Pages:
         status: int = 200,
         values: Mapping[str, Sequence[str]] | None = None,
         problems: Mapping[str, str] | None = None,
+        *,
+        early: bool = False,
     ) -> Response:
-        step = visit.step
-        data = step.data
-        more: dict[str, Any] = {}
-        if step.kind in ("consent", "instructions", "debrief"):
-            more["html"] = visit.study.texts[data["text"]].html
-        if step.kind in ("questionnaire", "comparison"):
-            more |= {
-                "questionnaire": _questionnaire(visit),
-                "values": values or {},
-                "problems": problems or {},
-            }
-        if step.kind == "comparison":
-            more |= {name: {"hat": data[name]["hat"]} for name in ("first", "second")}
-            more["human_hat"] = data["human_hat"]
-        if step.kind == "debrief":
-            more |= {"completion_code": data["completion_code"], "redirect": data["redirect"]}
-        if step.kind == "round":
-            more |= {
-                "socket": f"{visit.url}/play",
-                "next": visit.url,
-                "minutes": data["ticks"] * data["tick_ms"] / 60_000,
-                **{
-                    name: data[name]
-                    for name in ("round_no", "of", "goal", "human_hat", "partner_hat", "tutorial")
-                },
-                "skippable": data["skippable"],
-            }
-        return self._page(
-            f"{step.kind}.html",
-            status,
-            step=_public_step(step),
-            study=_public_study(visit.study),
-            progress={"at": visit.progress.step_index + 1, "of": len(visit.plan.steps)},
-            action=visit.url,
-            **more,
-        )
+        context = common_context(visit, self._clock.ms()) | step_context(visit, values, problems)
+        return self._page(f"{visit.step.kind}.html", status, **context, early=early)
 
     def _page(self, template: str, status_code: int = 200, /, **values: Any) -> Response:
         html = self._templates.get_template(template).render(**values)
         return HTMLResponse(html, status_code, NEVER_CACHED)
 
 
-def _public_study(study: Study) -> dict[str, Any]:
-    """What templates may know of a study: no agents, no design."""
-    return {"name": study.name, "title": study.title, "about": study.about, "minutes": study.minutes}
+def _link_params(request: Request) -> dict[str, str]:
+    """The parameters of a link, of bounded number and length."""
+    return {
+        name[:MAX_LINK_PARAM_CHARS]: value[:MAX_LINK_PARAM_CHARS].replace("\0", "")
+        for name, value in list(request.query_params.items())[:MAX_LINK_PARAMS]
+    }
 
 
-def _public_step(step: Step) -> dict[str, Any]:
-    """What templates may know of a step: no agents, no seeds."""
-    about = {name: step.data.get(name) for name in ("round_no", "partner_hat", "human_hat")}
-    return {"id": step.id, "kind": step.kind, "title": step.title, **about}
-
-
-def _questionnaire(visit: Visit) -> Questionnaire | None:
-    name = visit.step.data.get("questionnaire")
-    return None if name is None else visit.study.questionnaires[name]
+def _language(study: Study, request: Request) -> str:
+    """The language that a link asks for, else the one the browser likes best."""
+    asked = request.query_params.get(LANGUAGE_PARAM, "")
+    if asked in study.languages:
+        return asked
+    return choose_language(study.languages, request.headers.get("accept-language"))
 
 
 def _happening(step: Step, form: Mapping[str, list[str]]) -> Happening | None:
     """What a form without problems means for the visit; None when it says nothing."""
-    if step.kind == "consent":
-        choice = form.get("choice", [""])[0]
-        if choice == "decline":
-            return Declined(step.id)
-        return Agreed(step.id) if choice == "agree" else None
-    if step.kind == "instructions":
-        return Continued(step.id)
-    return Submitted(step.id) if step.kind in ("questionnaire", "comparison") else None
+    match step.kind:
+        case "consent":
+            choice = form.get("choice", [""])[0]
+            if choice == "decline":
+                return Declined(step.id)
+            return Agreed(step.id) if choice == "agree" else None
+        case "instructions" | "break":
+            return Continued(step.id)
+        case "questionnaire" | "comparison" | "quiz":
+            return Submitted(step.id)
+        case _:
+            return None

@@ -6,7 +6,9 @@ import os
 import signal
 import socket
 import sys
+import tempfile
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import uvicorn
@@ -46,10 +48,32 @@ def serve(
         os.environ if environ is None else environ, study=study, host=host, port=port, database=database
     )
     place = Workspace(workspace)
+    _serve(place, settings, settings.database or place.database, preview=False)
+
+
+def preview(
+    workspace: Path,
+    *,
+    study: str,
+    host: str | None = None,
+    port: int | None = None,
+    environ: Mapping[str, str] | None = None,
+) -> None:
+    """Serve one study as `serve` does, to walk through it: what is recorded is gone at the end.
+
+    Raises: as `serve`.
+    """
+    settings = read_settings(os.environ if environ is None else environ, study=study, host=host, port=port)
+    with tempfile.TemporaryDirectory(prefix="galley-preview-") as folder:
+        database = str(Path(folder) / "preview.sqlite")
+        _serve(Workspace(workspace), replace(settings, database=database), database, preview=True)
+
+
+def _serve(workspace: Workspace, settings: Settings, database: str, *, preview: bool) -> None:
     listening = listen(settings)
     try:
-        with Store.open(settings.database or place.database, serving=True) as store:
-            app = create_app(place, store, settings)
+        with Store.open(database, serving=True) as store:
+            app = create_app(workspace, store, settings, preview=preview)
             # A thread that wants the interpreter gets it sooner: a tick waits less for an agent that thinks
             # in Python.
             sys.setswitchinterval(SWITCH_INTERVAL_S)

@@ -10,6 +10,7 @@ from fastapi.responses import RedirectResponse, Response
 
 from galley.errors import GalleyError
 from galley.records import overview
+from galley.records.erase import erase_participant
 from galley.records.rows import SessionRow
 from galley.server.admin.desk import Desk, number
 from galley.server.admin.gate import HOME, NEVER_CACHED, Form, first
@@ -53,8 +54,6 @@ class VisitPages:
         # A visit that is over cannot take up its round again between the match's end and the erasing.
         await asyncio.wrap_future(store.end_visit(visit_id, "expired", now_ms))
         await self._desk.stop_visit(visit_id)
-        from galley.records.erase import erase_participant
-
         try:
             erased = await asyncio.to_thread(erase_participant, store, found.participant)
         except GalleyError as error:
