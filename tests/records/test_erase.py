@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from galley.errors import GalleyError
-from galley.records import Arrival, KeyRow, Planned, Store, VisitRow, erase, overview
+from galley.records import Arrival, KeyRow, Planned, Store, VisitRow, engine, erase, overview
 from galley.records.erase import Erased, erase_participant
 from galley.records.export import export_study
 from galley.records.trajectories import export_human_data, export_trajectories
@@ -186,6 +186,7 @@ def test_a_journal_that_arrives_late_brings_nothing_back(store: Store, database:
 
 def test_a_reader_that_does_not_end_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(erase, "SCRUB_S", 0.2)
+    monkeypatch.setattr(engine, "BUSY_MS", 20)
     with Store.open(tmp_path / "galley.sqlite") as store:
         visit = begin(store)
         with store.reading() as connection:

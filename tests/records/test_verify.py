@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from pathlib import Path
-
 import pytest
 from sqlalchemy import text
 
@@ -23,12 +20,6 @@ from tests.records.helpers import (
     play,
     tick_rows,
 )
-
-
-@pytest.fixture
-def store(tmp_path: Path) -> Iterator[Store]:
-    with Store.open(tmp_path / "galley.sqlite") as opened:
-        yield opened
 
 
 def test_rounds_as_they_were_played_agree(store: Store) -> None:
