@@ -66,3 +66,60 @@ def test_axe_finds_no_barrier(context: BrowserContext, name: str, shots: Callabl
         server.say(KEYFRAME | {"phase": "playing"})
         expect(page.locator("[data-part=over]")).to_be_hidden()
         assert barriers(page) == []
+
+
+PRESSED = """() => {
+  const on = document.activeElement;
+  const box = on.getBoundingClientRect();
+  const leads = on.matches("main button, main a.button, main a[href^='/s/']");
+  return [leads, box.width * box.height > 0, on.tagName];
+}"""
+FORMS = [name for name in PAGES if not name.startswith(("ending-c", "plain", "round"))]
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_keys_alone_lead_on(context: BrowserContext, name: str) -> None:
+    page, _ = visit(context, name)
+    for _ in range(80):
+        page.keyboard.press("Tab")
+        reached, seen, tag = page.evaluate(PRESSED)
+        assert seen, f"{tag} has the focus but cannot be seen"
+        if reached and page.evaluate("() => !document.activeElement.closest('.ranking')"):
+            break
+    else:
+        pytest.fail("the keyboard does not reach the way on")
+    outline = page.evaluate("() => getComputedStyle(document.activeElement).outlineStyle")
+    assert outline == "solid"
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_pages_lead_on_without_scripts(browser: Browser, name: str) -> None:
+    plain = browser.new_context(viewport=PHONE, java_script_enabled=False)
+    page, _ = visit(plain, name)
+    way_on = page.locator("main button[type=submit], main a.button, main a[href^='/s/']").first
+    expect(way_on).to_be_visible()
+    expect(way_on).to_be_enabled()
+    wide = page.locator("main").bounding_box()
+    assert wide is not None
+    assert wide["x"] >= 0
+    assert wide["x"] + wide["width"] <= PHONE["width"]
+    plain.close()
+
+
+def test_fingers_have_buttons_that_fit_and_work(browser: Browser) -> None:
+    phone = browser.new_context(viewport={"width": 360, "height": 640}, has_touch=True, is_mobile=True)
+    page, server = visit(phone, "round")
+    page.locator("[data-part=card-button]").tap()
+    server.say({"type": "countdown", "seconds": 1}, KEYFRAME | {"phase": "playing"})
+    for name in ("Up", "Left", "Right", "Down", "Take / put"):
+        button = page.get_by_role("button", name=name)
+        box = button.bounding_box()
+        assert box is not None
+        assert box["x"] >= 0
+        assert box["x"] + box["width"] <= 360
+        assert min(box["width"], box["height"]) >= 44
+        button.tap()
+    server.wait_for("key", 10)
+    presses = server.keys()
+    assert [key for key, down in presses if down] == ["up", "left", "right", "down", "interact"]
+    phone.close()

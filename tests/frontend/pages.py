@@ -60,6 +60,7 @@ def contexts(words: str = HOSTILE) -> dict[str, dict[str, Any]]:
 
     def visit(kind: str, **more: Any) -> dict[str, Any]:
         hats = {"partner_hat": FIRST_HAT, "human_hat": "blue"}
+        more["away"] = "/v/token/away"
         step = {"id": f"{kind}-1", "kind": kind, "title": words, "round_no": 1, **hats}
         return {"step": step, "study": study, "progress": {"at": 2, "of": 9}, "action": "/v/token", **more}
 
@@ -106,9 +107,11 @@ def contexts(words: str = HOSTILE) -> dict[str, dict[str, Any]]:
     }
 
 
-def render(name: str, **changes: Any) -> str:
+def render(name: str, words: str = HOSTILE, **changes: Any) -> str:
     """A template with its context, some of it changed."""
-    return templates(str(FRONTEND / "templates")).get_template(name).render(**(contexts()[name] | changes))
+    return (
+        templates(str(FRONTEND / "templates")).get_template(name).render(**(contexts(words)[name] | changes))
+    )
 
 
 VOID = ("meta", "link", "img", "input", "br", "hr", "path")

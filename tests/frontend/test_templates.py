@@ -187,8 +187,8 @@ def test_time_is_told_without_scripts_and_kept_by_them() -> None:
     assert page.all("button", type="submit")[0]["data-wait"] == "40"
     assert page.all("p")[1]["data-left"] == "250"
     assert "You have about 5 minutes for this page." in "".join(text for _, text in page.texts)
-    assert page.scripts == ["js/clock.js"]
-    assert not Page(render("break.html", wait_s=0, seconds_left=None)).scripts
+    assert page.scripts == ["js/clock.js", "js/away.js"]
+    assert not Page(render("break.html", wait_s=0, seconds_left=None, away=None)).scripts
 
 
 def test_a_stage_may_be_skipped_only_if_it_says_so() -> None:

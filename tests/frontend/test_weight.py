@@ -23,7 +23,7 @@ def _with_imports(path: Path, seen: set[Path]) -> set[Path]:
 
 @pytest.mark.parametrize("name", sorted(contexts()))
 def test_first_paint_without_drawings_is_light(name: str) -> None:
-    html = render(name)
+    html = render(name, "About as many words as a study has.")
     page = Page(html)
     files: set[Path] = set()
     for attrs in page.all("link", rel="stylesheet"):

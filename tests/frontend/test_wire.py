@@ -22,15 +22,16 @@ def _union(name: str) -> list[str]:
     return re.findall(r'"(\w+)"', row)
 
 
-def _shapes() -> dict[str, set[str]]:
-    """Fields of each message by its type, however its type is written down."""
+def _shapes() -> dict[str, tuple[set[str], set[str]]]:
+    """(needed, optional) fields of each message by its type, however its type is written down."""
     shapes = {}
     for row in re.findall(r'\{type: "[^{}]*\}', TEXT):
         fields = re.findall(r"(\w+):", row)
-        shapes[re.findall(r'type: "(\w+)"', row)[0]] = set(fields) - {"type"}
+        shapes[re.findall(r'type: "(\w+)"', row)[0]] = set(fields) - {"type"}, set[str]()
     for block in re.findall(r"/\*\*(.*?)\*/", TEXT, re.S):
         if found := re.search(r'@property \{"(\w+)"\} type', block):
-            shapes[found[1]] = set(re.findall(r"@property \{.*\} (\w+)", block)) - {"type"}
+            needed = set(re.findall(r"@property \{.*\} (\w+)", block)) - {"type"}
+            shapes[found[1]] = needed, set(re.findall(r"@property \{.*\} \[(\w+)\]", block))
     return shapes
 
 
@@ -54,4 +55,6 @@ def test_close_codes_are_those_of_the_server() -> None:
 
 @pytest.mark.parametrize("message", wire.MESSAGES, ids=lambda message: message.name)
 def test_fields_are_those_of_the_table(message: wire.Message) -> None:
-    assert _shapes()[message.name] == {field.name for field in message.fields}
+    needed, optional = _shapes()[message.name]
+    fields = {field.name for field in message.fields}
+    assert needed <= fields <= needed | optional

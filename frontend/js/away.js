@@ -1,0 +1,7 @@
+/** Tells the server when the page is in the background and when it is back; nothing is asked of the participant. */
+
+const { away = "", step = "" } = document.body.dataset;
+
+document.addEventListener("visibilitychange", () => {
+  navigator.sendBeacon(away, new URLSearchParams({ step, hidden: document.hidden ? "1" : "0" }));
+});
