@@ -21,11 +21,15 @@ def postgresql_server() -> Iterator[postgres.Postgres]:
 
 
 @pytest.fixture(params=["sqlite", "postgresql"])
-def database(request: pytest.FixtureRequest, tmp_path: Path) -> Database:
+def database(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Database]:
     """Each test that asks for this runs on both kinds."""
     if request.param == "sqlite":
-        return databases.sqlite(tmp_path)
-    return databases.postgresql(request.getfixturevalue("postgresql_server"))
+        yield databases.sqlite(tmp_path)
+        return
+    server = request.getfixturevalue("postgresql_server")
+    made = databases.postgresql(server)
+    yield made
+    databases.drop(server, made)
 
 
 @pytest.fixture

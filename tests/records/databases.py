@@ -51,6 +51,12 @@ def postgresql(server: Postgres) -> Database:
     return _made(server, TEMPLATE)
 
 
+def drop(server: Postgres, database: Database) -> None:
+    """Free its disk; each takes some 8 MB."""
+    name = database.url.partition("@/")[2].partition("?")[0]
+    server.execute(f"DROP DATABASE {name} WITH (FORCE)")
+
+
 def _made(server: Postgres, template: str) -> Database:
     name = f"galley_{next(NUMBERS)}"
     server.execute(f"CREATE DATABASE {name} TEMPLATE {template}")

@@ -60,7 +60,7 @@ def test_a_round_whose_orders_are_all_served_may_end_early(store: Store) -> None
         ("DELETE FROM ticks WHERE tick = 39", ["after 39 of 40 ticks"]),
         ("DELETE FROM ticks", ["after 0 of 40 ticks"]),
         (
-            "INSERT INTO ticks SELECT round_id, 40, 4, 4, 0, 0, 0, 0, NULL FROM ticks WHERE tick = 0",
+            "INSERT INTO ticks SELECT round_id, 40, 4, 4, 0, 0, 0, false, NULL FROM ticks WHERE tick = 0",
             ["41 ticks are stored, yet the episode is over after 40"],
         ),
         ("UPDATE rounds SET score = 40", ["score: stored 40, replayed 20"]),
@@ -68,7 +68,7 @@ def test_a_round_whose_orders_are_all_served_may_end_early(store: Store) -> None
         ("UPDATE rounds SET final_sha256 = 'x'", ["hash of the last state: stored x, replayed"]),
         ("UPDATE rounds SET layout_json = '{'", ["round 1"]),
         ("UPDATE rounds SET layout_json = '{}'", ["not a layout"]),
-        ("UPDATE ticks SET late = 1 WHERE tick = 2", ["tick 2: the agent of seat 0 was late or at fault"]),
+        ("UPDATE ticks SET late = true WHERE tick = 2", ["tick 2: the agent of seat 0 was late or at fault"]),
     ],
 )
 def test_damage_is_found(store: Store, damage: str, told: list[str]) -> None:
