@@ -57,6 +57,7 @@ class Office:
     study: Study
     clock: TurnedClock
     stopped: list[int]
+    database: Path
     url: str = ""
     opened: ExitStack = field(default_factory=ExitStack)
     visits: dict[str, VisitRow] = field(default_factory=dict)
@@ -64,7 +65,7 @@ class Office:
 
     def visitor(self, **headers: str) -> httpx.Client:
         """A browser of somebody who has not logged in."""
-        return self.opened.enter_context(httpx.Client(base_url=self.url, headers=headers, timeout=20))
+        return self.opened.enter_context(httpx.Client(base_url=self.url, headers=headers, timeout=60))
 
     def researcher(self) -> Researcher:
         """A browser of somebody who has."""
@@ -137,7 +138,7 @@ def open_office(database: Path, workspace: Workspace, study: Study, visits: bool
         )
         app.include_router(pages)
         app.add_middleware(SecureHeaders)
-        office = Office(pages, store, workspace, study, clock, stopped)
+        office = Office(pages, store, workspace, study, clock, stopped, database)
         if visits:
             _visit(office, Pilot(store, workspace, study, START_MS - 3_600_000))
         with _served(app) as office.url, office.opened:

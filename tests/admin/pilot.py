@@ -23,15 +23,24 @@ STAGE_MS = 20_000
 
 
 class Pilot:
-    """Fills a store. `now_ms` is the server's clock of the next visit."""
+    """Fills a store. `now_ms` is the server's clock of the next visit.
+
+    With `agents` the games are theirs; without, they are quick and senseless.
+    """
 
     def __init__(
-        self, store: Store, workspace: Workspace, study: Study, now_ms: float, seed: int = 1
+        self,
+        store: Store,
+        workspace: Workspace,
+        study: Study,
+        now_ms: float,
+        seed: int = 1,
+        agents: Catalogue | None = None,
     ) -> None:
         self.store = store
         self.study = study
         self.layouts = load_layouts(workspace)
-        self.catalogue = Catalogue(workspace)
+        self.catalogue = agents
         self.now_ms = now_ms
         self.draw = random.Random(seed)
         self.games: dict[tuple[str, str, int, int], list[tuple[int, int]]] = {}
@@ -170,6 +179,10 @@ class Pilot:
 
     def game(self, layout: Layout, agent: str, seat: int) -> list[tuple[int, int]]:
         """Joint actions of a planner with a wandering mind beside the agent, played once per pairing."""
+        if self.catalogue is None:
+            return [
+                (self.draw.randint(0, 5), self.draw.randint(0, 5)) for _ in range(layout.rules.horizon_ticks)
+            ]
         key = (layout.name, agent, seat, self.draw.randint(0, 1))
         if key not in self.games:
             chefs = [self.catalogue.bundle(name).make() for name in ("myopic", agent)]

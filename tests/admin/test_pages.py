@@ -7,12 +7,14 @@ import io
 import json
 import re
 import zipfile
+from pathlib import Path
 
 import pytest
 
 from galley.kitchen.trajectory import from_text
 from galley.records import overview
 from galley.server.admin.downloads import DOWNLOADS
+from galley.server.admin.exporting import write_export
 from galley.server.admin.visits import LONGEST_NOTE
 from tests.admin.office import HOSTILE, NAME, START_MS, Office
 from tests.admin.pilot import Pilot
@@ -203,40 +205,44 @@ def test_erasing_takes_the_name_typed_out_and_stops_the_match(fresh: Office) -> 
     researcher.page(f"/visits/{gone.id}", 404)
 
 
-@pytest.mark.parametrize("kind", DOWNLOADS)
-def test_downloads_hold_the_records(office: Office, kind: str) -> None:
-    answer = office.researcher().http.get(f"/researcher/studies/short/download/{kind}", timeout=120)
+def test_a_download_is_a_file_made_now(office: Office) -> None:
+    answer = office.researcher().http.get("/researcher/studies/short/download/csv", timeout=120)
     assert answer.status_code == 200, answer.text
-    assert re.fullmatch(
-        rf'attachment; filename="short-\d{{8}}-\d{{6}}\.{re.escape(DOWNLOADS[kind].ending)}"',
-        answer.headers["content-disposition"],
-    )
+    named = answer.headers["content-disposition"]
+    assert re.fullmatch(r'attachment; filename="short-\d{8}-\d{6}\.csv\.zip"', named)
     assert answer.headers["cache-control"] == "no-store"
-    visit, test = office.visits["done"], office.visits["test"]
+    with zipfile.ZipFile(io.BytesIO(answer.content)) as archive:
+        people = list(csv.DictReader(io.StringIO(archive.read("participants.csv").decode("utf-8-sig"))))
+    told = {person["participant"] for person in people}
+    assert told == {visit.participant for name, visit in office.visits.items() if name != "test"}
+
+
+@pytest.mark.parametrize("kind", DOWNLOADS)
+def test_every_kind_of_download_holds_the_records(office: Office, kind: str, tmp_path: Path) -> None:
+    out = tmp_path / f"out.{DOWNLOADS[kind].ending}"
+    write_export(str(office.database), "short", kind, True, out)
+    visit = office.visits["done"]
     if kind == "human-data":
-        rows = list(csv.DictReader(io.StringIO(answer.text)))
+        rows = list(csv.DictReader(io.StringIO(out.read_text("utf-8-sig"))))
         assert len(rows) > 100
         assert {"state", "joint_action", "reward", "layout_name"} <= set(rows[0])
-        return
-    if kind == "human-data-parquet":
-        assert answer.content[:4] == b"PAR1"
-        return
-    with zipfile.ZipFile(io.BytesIO(answer.content)) as archive:
-        names = archive.namelist()
-        if kind == "trajectories":
-            name = next(name for name in names if name.startswith(visit.participant))
-            assert len(from_text(archive.read(name).decode(), name).joint_actions) == 40
-            return
-        assert any(name.startswith("participants.") for name in names)
-        if kind == "jsonl":
-            lines = archive.read("participants.jsonl").decode().splitlines()
-            people = [json.loads(line)["participant"] for line in lines]
-            assert visit.participant in people
-            assert test.participant not in people
+    elif kind == "human-data-parquet":
+        assert out.read_bytes()[:4] == b"PAR1"
+    else:
+        with zipfile.ZipFile(out) as archive:
+            names = archive.namelist()
+            if kind == "trajectories":
+                name = next(name for name in names if name.startswith(visit.participant))
+                assert len(from_text(archive.read(name).decode(), name).joint_actions) == 40
+            else:
+                assert any(name.startswith("participants.") for name in names)
+            if kind == "jsonl":
+                lines = archive.read("participants.jsonl").decode().splitlines()
+                people = {json.loads(line)["participant"] for line in lines}
+                assert people == {visit.participant for visit in office.visits.values()}
 
 
 def test_a_download_that_fails_says_why(office: Office, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("PYTHONPATH", "")
     monkeypatch.setattr("galley.server.admin.downloads.sys.executable", "/bin/false")
     answer = office.researcher().http.get("/researcher/studies/short/download/csv")
     assert answer.status_code == 500

@@ -94,7 +94,7 @@ def test_an_episode_that_ends_early_hands_over_to_the_next() -> None:
     layout = TINY.with_rules(orders=("onion",))
     soup = one_soup()
     document = replay_document(row(soup + soup[:3], layout, episodes=2), {})
-    assert [frame["at"] for frame in document["frames"]][0] == 0
+    assert document["frames"][0]["at"] == 0
     second = document["frames"][1]["at"]
     assert 0 < second <= 40
     assert document["ticks"] == len(soup) + 3
