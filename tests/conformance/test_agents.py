@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -20,12 +21,23 @@ from galley.workspace import Workspace
 WORKSPACE = Workspace(Path(__file__).resolve().parents[2])
 CATALOGUE = Catalogue(WORKSPACE)
 TICKS = 120
+SLOW = ("centralized",)
+"""They search for many seconds before the first tick."""
 
-CASES = [
-    pytest.param(name, layout, id=f"{name}-{layout}")
-    for name in CATALOGUE.names()
-    for layout in CATALOGUE.bundle(name).layouts or WORKSPACE.names("layouts")
-]
+QUICK = ("cramped_room", "counter_circuit")
+
+
+def cases() -> Iterator[object]:
+    """Every agent on every layout that it knows; planners and scripts on most of them only with `full`."""
+    for name in CATALOGUE.names():
+        bundle = CATALOGUE.bundle(name)
+        for layout in bundle.layouts or WORKSPACE.names("layouts"):
+            quick = bundle.kind == "network" or (layout in QUICK and name not in SLOW)
+            marks = () if quick else (pytest.mark.full, pytest.mark.timeout(1800))
+            yield pytest.param(name, layout, id=f"{name}-{layout}", marks=marks)
+
+
+CASES = list(cases())
 
 Record = list[tuple[NDArray[np.int16], tuple[int, int]]]
 

@@ -60,7 +60,9 @@ def _parameter(parameter: inspect.Parameter, hint: object) -> Parameter:
         name = info.metavar or parameter.name.upper()
         return Parameter(name if required else f"[{name}]", None, False, required, info.help or "", default)
     assert isinstance(info, OptionInfo)
-    flag = next(iter(info.param_decls or ()), "--" + parameter.name.replace("_", "-"))
+    # Inside Annotated, typer reads the first string as a name of the option.
+    named = info.default if isinstance(info.default, str) else "--" + parameter.name.replace("_", "-")
+    flag = next(iter(info.param_decls or ()), named)
     names = {int: " N", bool: ""}
     shown = flag + names.get(kind, f" {info.metavar or flag.strip('-').upper()}")
     return Parameter(shown, flag, kind is not bool, required, info.help or "", default)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from galley.agents.bundle import Bundle, load_bundle
 from galley.agents.trial import trial
 from galley.errors import InvalidFiles, Problem
@@ -37,7 +39,8 @@ class Catalogue:
     def check(self) -> list[Problem]:
         """All problems of all bundles: their files, and how they play on every layout that they name.
 
-        Wrong layout files are told too, since no agent can be tried on them.
+        Those that name none are tried on the smallest and the largest of the workspace. Wrong layout files
+        are told too, since no agent can be tried on them.
         """
         layouts, problems = self._layouts()
         for name in self.names():
@@ -46,7 +49,7 @@ class Catalogue:
             except InvalidFiles as error:
                 problems += error.problems
                 continue
-            for layout_name in layouts if bundle.layouts is None else bundle.layouts:
+            for layout_name in _extremes(layouts) if bundle.layouts is None else bundle.layouts:
                 if layout_name not in layouts:
                     told = f"layout '{layout_name}' is not in the workspace"
                     place = ("layouts", layout_name)
@@ -69,3 +72,10 @@ class Catalogue:
                 layouts[name] = None
                 problems += error.problems
         return layouts, problems
+
+
+def _extremes(layouts: Mapping[str, Layout | None]) -> list[str]:
+    """The names of the layouts with the fewest and the most tiles."""
+    sizes = {name: layout.tiles.size for name, layout in layouts.items() if layout is not None}
+    by_size = sorted(sizes, key=lambda name: sizes[name])
+    return list(dict.fromkeys([*by_size[:1], *by_size[-1:]]))
