@@ -18,7 +18,7 @@ from galley.records import Store, VisitRow
 from galley.records.researchers import Researchers
 from galley.server.admin.pages import researcher_pages
 from galley.server.admin.passwords import Passwords
-from galley.server.app import frontend_folder
+from galley.server.app import Static, frontend_folder
 from galley.server.clock import Clock
 from galley.server.origin import SecureHeaders
 from galley.server.run import listen, server_config
@@ -137,6 +137,7 @@ def open_office(database: Path, workspace: Workspace, study: Study, visits: bool
             stop_visit=stop_visit,
         )
         app.include_router(pages)
+        app.mount("/static", Static(directory=frontend_folder()))
         app.add_middleware(SecureHeaders)
         office = Office(pages, store, workspace, study, clock, stopped, database)
         if visits:
