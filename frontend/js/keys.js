@@ -13,7 +13,7 @@ const CODES = Object.freeze(/** @type {Record<string, Key>} */ ({
 export class Keys {
   /**
    * @param {(key: Key, down: boolean) => void} onKey once per press and once per release, never repeated
-   * @param {(reason: ReleaseReason) => void} onRelease the page lost the keyboard: everything is let go
+   * @param {(reason: ReleaseReason) => void} onRelease the page lost the keyboard, or is in sight again: everything is let go
    */
   constructor(onKey, onRelease) {
     this.onKey = onKey;
@@ -25,9 +25,7 @@ export class Keys {
     window.addEventListener("keyup", (event) => this.up(event.code));
     window.addEventListener("blur", () => this.releaseAll("blur"));
     window.addEventListener("pagehide", () => this.releaseAll("pagehide"));
-    document.addEventListener("visibilitychange", () => {
-      if (document.hidden) this.releaseAll("hidden");
-    });
+    document.addEventListener("visibilitychange", () => this.releaseAll(document.hidden ? "hidden" : "shown"));
   }
 
   /** @param {boolean} enabled */

@@ -230,3 +230,31 @@ class Player:
             while True:
                 self.next()
         return int(self.socket.close_code or 0)
+
+
+@dataclass(frozen=True)
+class Played:
+    """What one of two people saw of a round: its first picture, its ticks, its end."""
+
+    frame: dict[str, Any]
+    ticks: list[dict[str, Any]]
+    ended: dict[str, Any]
+
+
+def together(*people: Participant) -> list[Played]:
+    """What each person saw of a round that they play with each other to its end, at the same time."""
+    seen: dict[int, Played] = {}
+
+    def play(number: int, person: Participant) -> None:
+        with person.play(f"tab-{number}") as player:
+            ended = player.whole_round()
+            frames = [message for message in player.received if message["type"] == "keyframe"]
+            ticks = [message for message in player.received if message["type"] == "tick"]
+            seen[number] = Played(frames[0], ticks, ended)
+
+    threads = [threading.Thread(target=play, args=pair) for pair in enumerate(people)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    return [seen[number] for number in range(len(people))]

@@ -11,11 +11,13 @@ import numpy as np
 import pytest
 
 from galley.kitchen import EAST, INTERACT, NORTH, STAY, WEST, Kitchen, Layout
-from galley.records import ClockRow, KeyRow, PauseRow, TickRow
+from galley.records import ClockRow, KeyRow, Lease, LeaseLost, PauseRow, TickRow
 from galley.server import wire
+from galley.server.catching_up import caught_up
 from galley.server.clock import Clock, Stagger, first_deadline
 from galley.server.journal import Handed, RoundJournal
 from galley.server.match import Match, RoundSpec
+from galley.server.person import Person
 from galley.server.thinking import Answer
 
 LAYOUT = """
@@ -96,6 +98,7 @@ class Kept:
         keys: Sequence[KeyRow] = (),
         pauses: Sequence[PauseRow] = (),
         clocks: Sequence[ClockRow] = (),
+        lease: Lease | None = None,
     ) -> None:
         self.ticks += ticks
         self.keys += keys
@@ -116,14 +119,18 @@ class Answering:
     def __init__(self, decide: Callable[[int], Answer | None]) -> None:
         self.decide = decide
         self.seen: list[tuple[int, tuple[int, int] | None]] = []
+        self.restarts: list[tuple[int, int]] = []
 
     def ask(self, tick: int, state: Any, seen: Any) -> Asked:
         self.seen.append((tick, None if seen is None else seen[1]))
         return Asked(self.decide(tick))
 
+    def restart(self, layout: Layout, seat: int, seed: int) -> None:
+        self.restarts += [(seat, seed)]
+
 
 class Round:
-    """A match with everything around it."""
+    """A match with everything around it: one person at seat 0 with an agent, or two people."""
 
     def __init__(
         self,
@@ -132,40 +139,66 @@ class Round:
         played: Sequence[tuple[int, int]] = (),
         countdown_s: int = 3,
         stagger: float = 0.25,
-        finish_fails: bool = False,
+        finish_fails: Exception | None = None,
+        people: int = 1,
+        episodes: int = 1,
+        **spec: Any,
     ) -> None:
-        self.kitchen = Kitchen(Layout.from_ascii("test", LAYOUT, horizon_ticks=horizon))
-        for joint in played:
-            self.kitchen.step(*joint)
+        layout = Layout.from_ascii("test", LAYOUT, horizon_ticks=horizon)
+        self.course = caught_up(layout, episodes, np.array(played, dtype=np.uint8).reshape(-1, 2))
         self.kept = Kept()
         self.mind = Answering(decide)
         self.ends: list[str] = []
         self.idle: list[Match] = []
-
-        async def finish(match: Match, outcome: str) -> None:
-            if finish_fails:
-                raise OSError("the disk is full")
-            self.ends.append(outcome)
-
-        spec = RoundSpec(
-            7, 150, 0, ("orange", "blue"), 160, 1, 2, False, countdown_s, abandon_after_s=60, next_url="/v/x"
-        )
+        self.away: list[tuple[int, float, float | None]] = []
+        self._finish_fails = finish_fails
+        self.person = Person(0, 1, ("orange", "blue"), "/v/x", repeats=spec.get("input_mode") != "press")
+        self.other = Person(1, 2, ("green", "red"), "/v/y")
+        settings = {"seeds": (1,) * episodes, **spec}
         self.match = Match(
-            spec,
-            self.kitchen,
-            self.mind,  # type: ignore[arg-type]
-            RoundJournal(self.kept, Ticking(), 7, 0),
+            RoundSpec(7, 150, 160, 1, 2, False, countdown_s, 60, **settings),
+            self.course,
+            (self.person, self.other if people == 2 else self.mind),  # type: ignore[arg-type]
+            RoundJournal(self.kept, Ticking(), 7),
             Ticking(),
+            self,
             stagger=stagger,
-            finish=finish,
-            idle=self.idle.append,
         )
         self.seq = 0
 
-    def key(self, name: str, down: bool) -> None:
+    async def finish(self, match: Match, outcome: str) -> None:
+        if self._finish_fails is not None:
+            raise self._finish_fails
+        self.ends.append(outcome)
+
+    async def stand_in(self, match: Match, person: Person) -> Any:
+        return self.mind
+
+    def forget(self, match: Match) -> None:
+        self.idle.append(match)
+
+    def hidden(self, match: Match, person: Person, since_ms: float, until_ms: float | None) -> None:
+        self.away.append((person.seat, since_ms, until_ms))
+
+    @property
+    def kitchen(self) -> Kitchen:
+        return self.course.kitchen
+
+    def join(self, tab: Tab) -> None:
+        self.match.join(self.person, tab)
+
+    def ready(self) -> None:
+        self.match.ready(self.person)
+
+    def key(self, name: str, down: bool, person: Person | None = None) -> None:
         self.seq += 1
         now = asyncio.get_running_loop().time()
-        self.match.key(wire.Key(name, down, self.seq, 1.0), now)
+        self.match.key(person or self.person, wire.Key(name, down, self.seq, 1.0), now)
+
+    def release(self, reason: str) -> None:
+        self.seq += 1
+        now = asyncio.get_running_loop().time()
+        self.match.release(self.person, wire.Release(reason, self.seq, 1.0), now)
 
 
 def run(test: Coroutine[Any, Any, None]) -> None:
@@ -181,10 +214,10 @@ async def until_tick(round_: Round, tick: int) -> None:
 def test_a_round_is_exactly_its_horizon_at_exact_deadlines() -> None:
     async def test() -> None:
         round_, tab = Round(horizon=400), Tab()
-        round_.match.join(tab)
+        round_.join(tab)
         assert [m["type"] for m in tab.messages] == ["keyframe"]
         assert tab.messages[0]["phase"] == "waiting"
-        round_.match.ready()
+        round_.ready()
         await until_tick(round_, 400)
         await asyncio.sleep(1)
         assert [m["seconds"] for m in tab.of("countdown")] == [3, 2, 1]
@@ -204,8 +237,8 @@ def test_a_round_is_exactly_its_horizon_at_exact_deadlines() -> None:
 def test_a_stall_costs_no_tick_and_moves_no_deadline() -> None:
     async def test() -> None:
         round_, tab = Round(horizon=20), Tab()
-        round_.match.join(tab)
-        round_.match.ready()
+        round_.join(tab)
+        round_.ready()
         await until_tick(round_, 5)
         loop = asyncio.get_running_loop()
         assert isinstance(loop, Loop)
@@ -225,8 +258,8 @@ def test_a_stall_costs_no_tick_and_moves_no_deadline() -> None:
 def test_lateness_counts_until_the_socket_has_the_tick() -> None:
     async def test() -> None:
         round_, tab = Round(horizon=3), Tab(slow_s=0.004)
-        round_.match.join(tab)
-        round_.match.ready()
+        round_.join(tab)
+        round_.ready()
         await until_tick(round_, 3)
         await asyncio.sleep(1)
         assert [row.lateness_ms for row in round_.kept.ticks] == pytest.approx([4.0] * 3)
@@ -237,8 +270,8 @@ def test_lateness_counts_until_the_socket_has_the_tick() -> None:
 def test_the_agent_is_asked_right_after_the_tick_before_and_shown_what_happened() -> None:
     async def test() -> None:
         round_ = Round(horizon=3)
-        round_.match.join(Tab())
-        round_.match.ready()
+        round_.join(Tab())
+        round_.ready()
         assert round_.mind.seen == [(0, None)]
         await until_tick(round_, 1)
         assert round_.mind.seen == [(0, None), (1, (STAY, EAST))]
@@ -254,8 +287,8 @@ def test_a_late_agent_stays_and_is_recorded_as_late() -> None:
             return None if tick == 1 else Answer(WEST, 3.0, None)
 
         round_ = Round(horizon=3, decide=decide)
-        round_.match.join(Tab())
-        round_.match.ready()
+        round_.join(Tab())
+        round_.ready()
         await until_tick(round_, 3)
         await asyncio.sleep(1)
         rows = round_.kept.ticks
@@ -271,8 +304,8 @@ def test_a_late_agent_stays_and_is_recorded_as_late() -> None:
 def test_an_agent_at_fault_stays_and_the_fault_is_recorded() -> None:
     async def test() -> None:
         round_ = Round(horizon=2, decide=lambda tick: Answer(None, 1.0, "error"))
-        round_.match.join(Tab())
-        round_.match.ready()
+        round_.join(Tab())
+        round_.ready()
         await until_tick(round_, 2)
         await asyncio.sleep(1)
         assert [(r.action_1, r.late, r.fault) for r in round_.kept.ticks] == [(STAY, False, "error")] * 2
@@ -283,15 +316,15 @@ def test_an_agent_at_fault_stays_and_the_fault_is_recorded() -> None:
 def test_keys_become_actions_and_are_recorded_with_their_tick() -> None:
     async def test() -> None:
         round_ = Round(horizon=8)
-        round_.match.join(Tab())
-        round_.match.ready()
+        round_.join(Tab())
+        round_.ready()
         await until_tick(round_, 1)
         round_.key("right", True)
         await until_tick(round_, 3)
         round_.key("right", False)
         round_.key("interact", True)
         await until_tick(round_, 5)
-        round_.match.release(wire.Release("blur", 9, 1.0), asyncio.get_running_loop().time())
+        round_.release("blur")
         await until_tick(round_, 8)
         await asyncio.sleep(1)
         taken = [row.action_0 for row in round_.kept.ticks]
@@ -305,10 +338,10 @@ def test_keys_become_actions_and_are_recorded_with_their_tick() -> None:
 def test_a_direction_held_in_the_countdown_acts_at_the_first_tick_and_a_tap_does_not() -> None:
     async def test() -> None:
         round_ = Round(horizon=2)
-        round_.match.join(Tab())
+        round_.join(Tab())
         with pytest.raises(wire.MessageError, match="waiting"):
             round_.key("up", True)
-        round_.match.ready()
+        round_.ready()
         round_.key("interact", True)
         round_.key("up", True)
         await until_tick(round_, 2)
@@ -321,8 +354,8 @@ def test_a_direction_held_in_the_countdown_acts_at_the_first_tick_and_a_tap_does
 def test_a_lost_connection_pauses_and_ready_goes_on_with_all_its_ticks() -> None:
     async def test() -> None:
         round_, tab = Round(horizon=20), Tab()
-        round_.match.join(tab)
-        round_.match.ready()
+        round_.join(tab)
+        round_.ready()
         await until_tick(round_, 8)
         round_.key("right", True)
         round_.match.leave(tab)
@@ -330,11 +363,11 @@ def test_a_lost_connection_pauses_and_ready_goes_on_with_all_its_ticks() -> None
         await asyncio.sleep(30)
         assert round_.kitchen.tick == 8
         back = Tab("two")
-        round_.match.join(back)
+        round_.join(back)
         assert back.messages[0]["phase"] == "paused"
         assert back.messages[0]["tick"] == 8
         assert back.messages[1] == {"type": "paused", "reason": "left", "seconds_left": 30}
-        round_.match.ready()
+        round_.ready()
         await until_tick(round_, 20)
         await asyncio.sleep(1)
         rows = round_.kept.ticks
@@ -355,8 +388,8 @@ def test_a_lost_connection_pauses_and_ready_goes_on_with_all_its_ticks() -> None
 def test_a_connection_lost_in_the_countdown_before_the_first_tick_is_no_pause() -> None:
     async def test() -> None:
         round_, tab = Round(horizon=2), Tab()
-        round_.match.join(tab)
-        round_.match.ready()
+        round_.join(tab)
+        round_.ready()
         await asyncio.sleep(1.5)
         round_.match.leave(tab)
         assert round_.match.phase == "waiting"
@@ -370,14 +403,14 @@ def test_a_connection_lost_in_the_countdown_before_the_first_tick_is_no_pause() 
 def test_leaving_again_in_the_countdown_after_a_pause_is_one_pause() -> None:
     async def test() -> None:
         round_, tab = Round(horizon=9), Tab()
-        round_.match.join(tab)
-        round_.match.ready()
+        round_.join(tab)
+        round_.ready()
         await until_tick(round_, 4)
         for _ in range(2):
             round_.match.leave(tab)
             await asyncio.sleep(5)
-            round_.match.join(tab)
-            round_.match.ready()
+            round_.join(tab)
+            round_.ready()
             await asyncio.sleep(1)
         await until_tick(round_, 9)
         assert len(round_.kept.pauses) == 1
@@ -388,8 +421,8 @@ def test_leaving_again_in_the_countdown_after_a_pause_is_one_pause() -> None:
 def test_a_pause_that_is_too_long_abandons_the_round() -> None:
     async def test() -> None:
         round_, tab = Round(), Tab()
-        round_.match.join(tab)
-        round_.match.ready()
+        round_.join(tab)
+        round_.ready()
         await until_tick(round_, 8)
         round_.match.leave(tab)
         await asyncio.sleep(59)
@@ -398,10 +431,10 @@ def test_a_pause_that_is_too_long_abandons_the_round() -> None:
         assert (round_.match.phase, round_.ends) == ("ended", ["abandoned"])
         assert len(round_.kept.ticks) == 8
         back = Tab()
-        round_.match.join(back)
+        round_.join(back)
         assert back.of("ended")[0]["outcome"] == "abandoned"
         with pytest.raises(wire.MessageError, match="ended"):
-            round_.match.ready()
+            round_.ready()
 
     run(test())
 
@@ -409,7 +442,7 @@ def test_a_pause_that_is_too_long_abandons_the_round() -> None:
 def test_a_round_that_nobody_came_to_is_let_go_of_but_not_ended() -> None:
     async def test() -> None:
         round_, tab = Round(), Tab()
-        round_.match.join(tab)
+        round_.join(tab)
         await asyncio.sleep(100)
         assert not round_.idle, "somebody reads the start card"
         round_.match.leave(tab)
@@ -423,16 +456,16 @@ def test_a_round_that_nobody_came_to_is_let_go_of_but_not_ended() -> None:
 def test_the_newest_tab_wins_and_the_older_is_told() -> None:
     async def test() -> None:
         round_, old, new = Round(), Tab("old"), Tab("new")
-        round_.match.join(old)
-        round_.match.ready()
+        round_.join(old)
+        round_.ready()
         await until_tick(round_, 3)
-        round_.match.join(new)
+        round_.join(new)
         assert old.messages[-1] == {"type": "elsewhere"}
         assert old.closed == wire.CLOSE_REPLACED
         assert new.messages[0]["phase"] == "paused"
         round_.match.leave(old)
-        assert round_.match.connection is new
-        round_.match.ready()
+        assert round_.person.connection is new
+        round_.ready()
         await until_tick(round_, 20)
         await asyncio.sleep(1)
         assert len(old.of("tick")) == 3
@@ -444,8 +477,8 @@ def test_the_newest_tab_wins_and_the_older_is_told() -> None:
 def test_the_same_tab_coming_back_is_not_told_of_another() -> None:
     async def test() -> None:
         round_, dead, alive = Round(), Tab("same"), Tab("same")
-        round_.match.join(dead)
-        round_.match.join(alive)
+        round_.join(dead)
+        round_.join(alive)
         assert not dead.of("elsewhere")
         assert dead.closed == wire.CLOSE_REPLACED
 
@@ -455,13 +488,13 @@ def test_the_same_tab_coming_back_is_not_told_of_another() -> None:
 def test_ready_out_of_turn_is_refused_and_changes_nothing() -> None:
     async def test() -> None:
         round_, tab = Round(horizon=5), Tab()
-        round_.match.join(tab)
-        round_.match.ready()
+        round_.join(tab)
+        round_.ready()
         with pytest.raises(wire.MessageError, match="countdown"):
-            round_.match.ready()
+            round_.ready()
         await until_tick(round_, 2)
         with pytest.raises(wire.MessageError, match="playing"):
-            round_.match.ready()
+            round_.ready()
         await until_tick(round_, 5)
         await asyncio.sleep(1)
         assert len(round_.kept.ticks) == 5
@@ -473,10 +506,10 @@ def test_a_round_taken_up_again_waits_paused_and_plays_the_rest() -> None:
     async def test() -> None:
         round_, tab = Round(horizon=10, played=[(EAST, STAY)] * 4), Tab()
         assert round_.match.phase == "paused"
-        round_.match.join(tab)
+        round_.join(tab)
         assert tab.messages[0]["tick"] == 4
         assert tab.of("paused")[0]["reason"] == "restart"
-        round_.match.ready()
+        round_.ready()
         await until_tick(round_, 10)
         await asyncio.sleep(1)
         assert [row.tick for row in round_.kept.ticks] == [4, 5, 6, 7, 8, 9]
@@ -496,8 +529,8 @@ def test_a_round_taken_up_after_its_last_tick_is_closed_at_once() -> None:
 def test_a_shutdown_journals_the_last_tick_and_marks_the_pause() -> None:
     async def test() -> None:
         round_, tab = Round(), Tab()
-        round_.match.join(tab)
-        round_.match.ready()
+        round_.join(tab)
+        round_.ready()
         await until_tick(round_, 6)
         round_.match.stop()
         await asyncio.sleep(100)
@@ -512,9 +545,9 @@ def test_a_round_that_cannot_be_closed_closes_the_page_and_is_not_said_to_have_e
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     async def test() -> None:
-        round_, tab = Round(horizon=2, finish_fails=True), Tab()
-        round_.match.join(tab)
-        round_.match.ready()
+        round_, tab = Round(horizon=2, finish_fails=OSError("the disk is full")), Tab()
+        round_.join(tab)
+        round_.ready()
         await until_tick(round_, 2)
         await asyncio.sleep(1)
         assert tab.closed == wire.CLOSE_ENDED
@@ -527,9 +560,11 @@ def test_a_round_that_cannot_be_closed_closes_the_page_and_is_not_said_to_have_e
 def test_pings_are_answered_and_kept_once_a_second() -> None:
     async def test() -> None:
         round_, tab = Round(), Tab()
-        round_.match.join(tab)
+        round_.join(tab)
         for number in range(30):
-            round_.match.ping(wire.Ping(float(number), None), asyncio.get_running_loop().time())
+            round_.match.ping(
+                round_.person, wire.Ping(float(number), None), asyncio.get_running_loop().time()
+            )
             await asyncio.sleep(0.1)
         assert len(tab.of("pong")) == 30
         assert [row.client_ms for row in round_.kept.clocks] == pytest.approx([0.0, 10.0, 20.0], abs=1.01)
@@ -540,14 +575,14 @@ def test_pings_are_answered_and_kept_once_a_second() -> None:
 def test_every_message_of_the_server_is_as_the_table_says() -> None:
     async def test() -> None:
         round_, tab, other = Round(horizon=20), Tab("one"), Tab("two")
-        round_.match.join(tab)
-        round_.match.ready()
+        round_.join(tab)
+        round_.ready()
         await until_tick(round_, 3)
         round_.key("right", True)
         await until_tick(round_, 9)
-        round_.match.ping(wire.Ping(1.0, 2.0), 5.0)
-        round_.match.join(other)
-        round_.match.ready()
+        round_.match.ping(round_.person, wire.Ping(1.0, 2.0), 5.0)
+        round_.join(other)
+        round_.ready()
         await until_tick(round_, 20)
         await asyncio.sleep(1)
         seen = set()
@@ -577,3 +612,271 @@ def test_the_first_deadline_is_the_next_one_of_its_phase(earliest: float, phase:
     assert earliest - 1e-9 <= found < earliest + TICK_S + 1e-9
     off = (found / TICK_S - phase) % 1.0
     assert min(off, 1.0 - off) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_episodes_follow_each_other_with_a_countdown_and_count_as_one_round() -> None:
+    async def test() -> None:
+        round_, tab = Round(horizon=5, episodes=3, seeds=(4, 5, 6)), Tab()
+        round_.join(tab)
+        round_.ready()
+        while not round_.ends:
+            await asyncio.sleep(0.1)
+        await asyncio.sleep(1)
+        assert [row.tick for row in round_.kept.ticks] == list(range(15))
+        assert [m["tick"] for m in tab.of("tick")] == [1, 2, 3, 4, 5] * 3
+        assert round_.mind.restarts == [(1, 5), (1, 6)]
+        assert [tick for tick, _ in round_.mind.seen] == [0, 1, 2, 3, 4] * 3
+        assert [seen for tick, seen in round_.mind.seen if tick == 0] == [None] * 3
+        starts = [(m["phase"], m["episode"], m["tick"]) for m in tab.of("keyframe")]
+        assert starts == [
+            ("waiting", 1, 0),
+            *[(phase, episode, 0) for episode in (1, 2, 3) for phase in ("countdown", "playing")],
+        ]
+        assert len(tab.of("countdown")) == 9
+        gaps = np.diff([row.deadline_ms for row in round_.kept.ticks])
+        assert np.allclose(np.delete(gaps, [4, 9]), 150.0)
+        assert gaps[4] > 3000
+        assert round_.ends == ["finished"]
+
+    run(test())
+
+
+def test_a_round_is_taken_up_in_the_episode_where_it_was() -> None:
+    async def test() -> None:
+        for played, episode, tick in ((7, 2, 2), (5, 2, 0), (14, 3, 4)):
+            round_, tab = Round(horizon=5, episodes=3, played=[(STAY, STAY)] * played), Tab()
+            round_.join(tab)
+            frame = tab.messages[0]
+            assert (frame["phase"], frame["episode"], frame["tick"]) == ("paused", episode, tick)
+            round_.ready()
+            while not round_.ends:
+                await asyncio.sleep(0.1)
+            await asyncio.sleep(1)
+            assert [row.tick for row in round_.kept.ticks] == list(range(played, 15))
+
+    run(test())
+
+
+def test_the_last_state_of_a_round_left_between_episodes_is_of_the_one_that_was_played() -> None:
+    layout = Layout.from_ascii("test", LAYOUT, horizon_ticks=3)
+    course = caught_up(layout, 2, np.array([[EAST, STAY]] * 3, dtype=np.uint8))
+    assert (course.episode, course.kitchen.tick) == (2, 0)
+    alone = Kitchen(layout)
+    for _ in range(3):
+        alone.step(EAST, STAY)
+    assert course.last_state.tolist() == alone.state.tolist()
+
+
+def test_in_press_mode_every_press_is_one_action() -> None:
+    async def test() -> None:
+        round_ = Round(horizon=8, input_mode="press")
+        round_.join(Tab())
+        round_.ready()
+        await until_tick(round_, 1)
+        for name in ("right", "left", "up"):
+            round_.key(name, True)
+        await until_tick(round_, 8)
+        await asyncio.sleep(1)
+        taken = [row.action_0 for row in round_.kept.ticks]
+        assert taken == [STAY, EAST, WEST, NORTH, STAY, STAY, STAY, STAY]
+
+    run(test())
+
+
+def test_a_page_out_of_sight_is_noted_until_it_is_seen_again() -> None:
+    async def test() -> None:
+        round_, tab = Round(horizon=90), Tab()
+        round_.join(tab)
+        round_.release("hidden")
+        assert not round_.away, "nothing is played yet"
+        round_.ready()
+        await until_tick(round_, 2)
+        start = asyncio.get_running_loop().time()
+        round_.release("hidden")
+        round_.release("hidden")
+        await asyncio.sleep(2)
+        round_.release("shown")
+        round_.release("hidden")
+        await asyncio.sleep(1)
+        round_.match.leave(tab)
+        ms = [1000 * (start + after) for after in (0, 2, 2, 3)]
+        assert [(s, pytest.approx(a), b) for s, a, b in round_.away] == [
+            (0, ms[0], None),
+            (0, ms[0], pytest.approx(ms[1])),
+            (0, ms[2], None),
+            (0, ms[2], pytest.approx(ms[3])),
+        ]
+
+    run(test())
+
+
+def test_a_round_that_another_server_took_over_stops_at_its_next_tick() -> None:
+    async def test() -> None:
+        round_, tab = Round(), Tab()
+        lease = Lease(7, "me", 1, 10.0)
+        round_.match.journal.lease = lease
+        round_.join(tab)
+        round_.ready()
+        await until_tick(round_, 4)
+        lease.lose()
+        await asyncio.sleep(5)
+        assert round_.kitchen.tick == 4
+        assert tab.messages[-1] == {"type": "elsewhere"}
+        assert tab.closed == wire.CLOSE_REPLACED
+        assert (round_.ends, round_.idle) == ([], [round_.match])
+
+    run(test())
+
+
+def test_a_round_that_was_taken_over_before_it_could_be_closed_is_not_said_to_have_ended() -> None:
+    async def test() -> None:
+        round_, tab = Round(horizon=2, finish_fails=LeaseLost("gone")), Tab()
+        round_.join(tab)
+        round_.ready()
+        await until_tick(round_, 2)
+        await asyncio.sleep(1)
+        assert not tab.of("ended")
+        assert tab.closed == wire.CLOSE_REPLACED
+
+    run(test())
+
+
+# ---- two people ----------------------------------------------------------------------------------------
+
+
+async def both_playing(round_: Round, ticks: int) -> tuple[Tab, Tab]:
+    one, two = Tab("one"), Tab("two")
+    round_.match.join(round_.person, one)
+    round_.match.join(round_.other, two)
+    round_.match.ready(round_.person)
+    round_.match.ready(round_.other)
+    await until_tick(round_, ticks)
+    return one, two
+
+
+def test_two_people_play_once_both_are_ready_and_each_key_moves_its_own_chef() -> None:
+    async def test() -> None:
+        round_ = Round(horizon=6, people=2, partner="human")
+        one, two = Tab("one"), Tab("two")
+        round_.match.join(round_.person, one)
+        round_.match.ready(round_.person)
+        with pytest.raises(wire.MessageError, match="other participant"):
+            round_.match.ready(round_.person)
+        await asyncio.sleep(20)
+        assert round_.match.phase == "waiting"
+        round_.match.join(round_.other, two)
+        round_.match.ready(round_.other)
+        await until_tick(round_, 1)
+        round_.key("right", True)
+        round_.key("up", True, round_.other)
+        await until_tick(round_, 6)
+        await asyncio.sleep(1)
+        assert [(r.action_0, r.action_1) for r in round_.kept.ticks][1:] == [(EAST, NORTH)] * 5
+        assert not any(row.late for row in round_.kept.ticks)
+        assert [(row.key, row.seat) for row in round_.kept.keys] == [("right", 0), ("up", 1)]
+        assert [(tab.messages[0]["seat"], tab.messages[0]["hats"]) for tab in (one, two)] == [
+            (0, ["orange", "blue"]),
+            (1, ["green", "red"]),
+        ]
+        assert one.of("tick") == two.of("tick")
+        assert [tab.of("ended")[0]["next"] for tab in (one, two)] == ["/v/x", "/v/y"]
+
+    run(test())
+
+
+def test_a_pause_of_one_is_shown_to_both_and_only_who_left_presses_go_on() -> None:
+    async def test() -> None:
+        round_ = Round(people=2, partner="human")
+        one, two = await both_playing(round_, 5)
+        round_.match.leave(two)
+        assert one.messages[-1] == {"type": "paused", "reason": "partner", "seconds_left": 60}
+        await asyncio.sleep(10)
+        back = Tab("two")
+        round_.match.join(round_.other, back)
+        assert back.messages[-1] == {"type": "paused", "reason": "left", "seconds_left": 50}
+        with pytest.raises(wire.MessageError):
+            round_.match.ready(round_.person)
+        round_.match.ready(round_.other)
+        await until_tick(round_, 20)
+        await asyncio.sleep(1)
+        assert [row.tick for row in round_.kept.ticks] == list(range(20))
+        assert len(round_.kept.pauses) == 1
+        assert round_.ends == ["finished"]
+
+    run(test())
+
+
+@pytest.mark.parametrize("leaver", [0, 1])
+def test_a_drop_out_ends_the_round_for_the_other_who_is_told(leaver: int) -> None:
+    async def test() -> None:
+        round_ = Round(people=2, partner="human")
+        tabs = await both_playing(round_, 5)
+        round_.match.leave(tabs[leaver])
+        await asyncio.sleep(61)
+        assert round_.ends == ["abandoned"]
+        assert tabs[1 - leaver].messages[-1]["outcome"] == "partner_left"
+        late = Tab("late")
+        round_.match.join((round_.person, round_.other)[leaver], late)
+        assert late.messages[-1]["outcome"] == "abandoned"
+
+    run(test())
+
+
+def test_an_agent_takes_the_seat_of_a_drop_out_and_the_round_goes_on() -> None:
+    async def test() -> None:
+        round_ = Round(people=2, partner="human", dropout="myopic")
+        one, two = await both_playing(round_, 5)
+        round_.match.leave(two)
+        await until_tick(round_, 20)
+        await asyncio.sleep(1)
+        assert round_.ends == ["finished"]
+        assert [row.tick for row in round_.kept.ticks] == list(range(20))
+        assert [row.action_1 for row in round_.kept.ticks] == [STAY] * 5 + [EAST] * 15
+        assert one.messages[-1]["outcome"] == "finished"
+        assert round_.match.people == [round_.person]
+
+    run(test())
+
+
+def test_when_both_are_gone_the_round_is_abandoned_whatever_the_study_says_of_drop_outs() -> None:
+    async def test() -> None:
+        round_ = Round(people=2, partner="human", dropout="myopic")
+        one, two = await both_playing(round_, 5)
+        round_.match.leave(two)
+        round_.match.leave(one)
+        await asyncio.sleep(130)
+        assert round_.ends == ["abandoned"]
+
+    run(test())
+
+
+def test_who_never_presses_start_keeps_the_other_waiting_for_so_long_only() -> None:
+    async def test() -> None:
+        round_ = Round(people=2, partner="human")
+        one, two = Tab("one"), Tab("two")
+        round_.match.join(round_.person, one)
+        round_.match.join(round_.other, two)
+        round_.match.ready(round_.person)
+        await asyncio.sleep(59)
+        assert not round_.ends
+        await asyncio.sleep(2)
+        assert round_.ends == ["abandoned"]
+        assert one.messages[-1]["outcome"] == "partner_left"
+        assert two.messages[-1]["outcome"] == "abandoned"
+
+    run(test())
+
+
+def test_leaving_in_the_first_countdown_lets_both_press_start_again() -> None:
+    async def test() -> None:
+        round_ = Round(people=2, partner="human")
+        one, two = await both_playing(round_, 0)
+        assert round_.match.phase == "countdown"
+        round_.match.leave(two)
+        assert one.messages[-1]["phase"] == "waiting"
+        round_.match.join(round_.other, two)
+        round_.match.ready(round_.person)
+        round_.match.ready(round_.other)
+        await until_tick(round_, 20)
+
+    run(test())

@@ -24,6 +24,7 @@ from galley.kitchen.layout_file import load_layouts
 from galley.records import Store
 from galley.server.admin.pages import researcher_pages
 from galley.server.clock import Clock
+from galley.server.lobby import Lobby
 from galley.server.matches import Matches, round_layout
 from galley.server.origin import HEADERS, SecureHeaders
 from galley.server.pages import NO_PAGE, NOT_FOUND, Pages, templates
@@ -74,7 +75,16 @@ def create_app(workspace: Workspace, store: Store, settings: Settings, *, previe
     matches = Matches(store, visits, catalogue, layouts, thinking, clock)
     frontend = frontend_folder()
     environment = templates(str(frontend / "templates"), catalogues)
-    pages = Pages(studies, visits, matches, store, clock, environment, settings.max_form_kib * 1024)
+    pages = Pages(
+        studies,
+        visits,
+        matches,
+        Lobby(matches, visits, clock),
+        store,
+        clock,
+        environment,
+        settings.max_form_kib * 1024,
+    )
     play = Play(visits, matches, settings.messages_per_s)
 
     @asynccontextmanager

@@ -31,10 +31,11 @@ class KeyState:
     Every press acts at least once, in the order pressed, also when it was shorter than a tick. Interact acts
     once a press however long it is held. A held direction repeats each tick; of several the latest pressed
     wins. At most MAX_WAITING presses wait for their tick; more are forgotten, so that hammering a key cannot
-    run ahead.
+    run ahead. Without `repeats` directions are as interact: each press acts once.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, repeats: bool = True) -> None:
+        self._repeats = repeats
         self._down: set[str] = set()
         self._held: list[str] = []
         self._waiting: list[_Press] = []
@@ -79,11 +80,11 @@ class KeyState:
 
     def take(self) -> int:
         """The action of the tick that is now due."""
-        while len(self._waiting) > 1 and self._outdone(self._waiting[0], self._waiting[1]):
+        while self._repeats and len(self._waiting) > 1 and self._outdone(self._waiting[0], self._waiting[1]):
             self._waiting.pop(0)
         if self._waiting:
             return ACTION_OF_KEY[self._waiting.pop(0).key]
-        return ACTION_OF_KEY[self._held[-1]] if self._held else STAY
+        return ACTION_OF_KEY[self._held[-1]] if self._held and self._repeats else STAY
 
     @staticmethod
     def _outdone(first: _Press, second: _Press) -> bool:

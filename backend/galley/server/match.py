@@ -5,260 +5,419 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-from collections.abc import Awaitable, Callable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from galley.kitchen import STAY, Kitchen
-from galley.records import PauseRow
+from galley.kitchen import STAY
+from galley.records import LeaseLost, PauseRow
 from galley.server import wire
 from galley.server.clock import Clock, first_deadline
-from galley.server.input import KeyState
+from galley.server.course import Course
 from galley.server.journal import Handed, Played, RoundJournal
+from galley.server.person import Connection, Person
 from galley.server.scene import Scene, happenings
-from galley.server.thinking import Mind
+from galley.server.thinking import Mind, Question
 
 LOG = logging.getLogger(__name__)
 LEFT = "left"
 RESTART = "restart"
+PARTNER = "partner"
+END_ROUND = "end_round"
 
 
 @dataclass(frozen=True, slots=True)
 class RoundSpec:
-    """What is fixed about a round before it is played, besides its kitchen and the agent's mind."""
+    """What is fixed about a round before it is played, besides its kitchen and who plays.
+
+    `seeds` are those of the agent's episodes; `dropout` is what follows when one of two people does not come
+    back: END_ROUND, or the name of the agent that takes the seat.
+    """
 
     round_id: int
     tick_ms: int
-    human_seat: int
-    hats: tuple[str, str]
     goal: int | None
     round_no: int
     of: int
     tutorial: bool
     countdown_s: int
     abandon_after_s: float
-    next_url: str
+    seeds: tuple[int, ...] = (0,)
+    partner: str = "agent"
+    input_mode: str = "hold"
+    show_score: str = "during"
+    dropout: str = END_ROUND
 
 
-class Connection(Protocol):
-    """A browser's socket as a match sees it: nothing here waits."""
+class Keeping(Protocol):
+    """What a match asks of whoever made it."""
 
-    tab: str
+    async def finish(self, match: Match, outcome: str) -> None:
+        """Store the end; awaited once, before anybody is told."""
 
-    def send(self, text: str, handed: Handed | None = None) -> None:
-        """Queue a frame."""
+    async def stand_in(self, match: Match, person: Person) -> Mind:
+        """An agent made ready for the seat of somebody who left, once that is stored."""
 
-    def close(self, code: int) -> None:
-        """Close once everything queued is sent."""
+    def forget(self, match: Match) -> None:
+        """Let go of it: nobody came, or another process has it."""
+
+    def hidden(self, match: Match, person: Person, since_ms: float, until_ms: float | None) -> None:
+        """Note that a person's page is out of sight, or was."""
 
 
 class Match:
-    """One round from its first connection to its end.
+    """One round from its first connection to its end, for one person with an agent or for two people.
 
-    Phases: waiting -> countdown -> playing -> ended. A connection lost in countdown or play pauses it, and
-    `ready` leads from paused to countdown again; a pause that lasts too long ends it as abandoned. Tick k is
-    due at `deadline(k)`. Each start, and each going on after a pause, fixes the deadlines of all ticks left,
-    at the phase of the tick that this match was given (`stagger` in [0, 1)), so that matches do not tick in
-    step. `finish` is awaited once with the outcome when the round is over; `ended` is sent after it. `idle`
-    is called when nobody was connected for long before the first tick.
+    Phases: waiting -> countdown -> playing -> ended, the middle two once for each episode. The countdown
+    begins when everybody is ready. Somebody lost in countdown or play pauses the round; when they are ready
+    again it goes on with a countdown. A pause that lasts too long ends the round as abandoned, or, when the
+    other person is still there, does what the study says of drop-outs. Tick k is due at `deadline(k)`. Each
+    start, and each going on after a pause, fixes the deadlines of all ticks left, at the phase of the tick
+    that this match was given (`stagger` in [0, 1)), so that matches do not tick in step.
     """
 
     def __init__(
         self,
         spec: RoundSpec,
-        kitchen: Kitchen,
-        mind: Mind,
+        course: Course,
+        players: tuple[Person | Mind, Person | Mind],
         journal: RoundJournal,
         clock: Clock,
+        keeping: Keeping,
         *,
         stagger: float,
-        finish: Callable[[Match, str], Awaitable[None]],
-        idle: Callable[[Match], None],
     ) -> None:
         self.spec = spec
-        self.kitchen = kitchen
-        self.scene = Scene(kitchen.layout)
-        self.mind = mind
+        self.course = course
+        self.scene = Scene(course.layout)
+        self.players = list(players)
         self.phase = "waiting"
         self.outcome: str | None = None
-        self.connection: Connection | None = None
-        self.keys = KeyState()
+        self.left: tuple[Person, ...] = ()
         self.journal = journal
         self._clock = clock
+        self._keeping = keeping
         self._loop = asyncio.get_running_loop()
         self._tick_s = spec.tick_ms / 1000.0
         self._stagger = stagger
-        self._finish = finish
-        self._idle = idle
         self._timer: asyncio.TimerHandle | None = None
         self._absence: asyncio.TimerHandle | None = None
         self._give_up_at_s = 0.0
         self._start_s = 0.0
-        self._start_tick = kitchen.tick
+        self._start_tick = course.ticks
         self._pause: PauseRow | None = None
         self._ending: asyncio.Task[None] | None = None
-        self._state = kitchen.state.copy()
-        self._question = mind.ask(kitchen.tick, self._state, None)
-        if kitchen.done:
+        self._replacing: asyncio.Task[None] | None = None
+        if course.between:
+            course.next_episode()
+        self._state = course.kitchen.state.copy()
+        self._questions: dict[int, Question] = {}
+        if course.over:
             self.end("finished")
-        elif kitchen.tick > 0:
+            return
+        self._ask(None)
+        if course.ticks > 0:
             self._stand_still(RESTART)
         else:
-            self._await_return()
+            self._await()
 
-    # ---- what the browser does -----------------------------------------------------------------------------
+    @property
+    def people(self) -> list[Person]:
+        """The participants who still belong to the round."""
+        return [player for player in self.players if isinstance(player, Person)]
 
-    def join(self, connection: Connection) -> None:
+    # ---- what the browsers do ------------------------------------------------------------------------------
+
+    def join(self, person: Person, connection: Connection) -> None:
         """Take a connection that has said hello: the newest wins, an older one is told and closed."""
-        older = self.connection
+        older = person.connection
         if older is not None:
             if older.tab != connection.tab:
                 older.send(wire.encode("elsewhere"))
             older.close(wire.CLOSE_REPLACED)
             self.leave(older)
-        self.connection = connection
+        person.connection = connection
         if self.phase == "waiting":
-            self._cancel_absence()
-        self.show()
+            self._await()
+        self.show(person)
 
     def leave(self, connection: Connection, reason: str = LEFT) -> None:
         """Lose a connection; nothing happens when another has taken its place."""
-        if self.connection is not connection:
+        person = next((one for one in self.people if one.connection is connection), None)
+        if person is None:
             return
-        self.connection = None
-        if self.phase == "playing" or (self.phase == "countdown" and self.kitchen.tick > 0):
+        person.connection = None
+        was_ready, person.ready = person.ready, False
+        self._in_sight(person)
+        if self.phase == "playing" or (self.phase == "countdown" and self.course.ticks > 0):
             self._stand_still(reason)
         elif self.phase in ("waiting", "countdown"):
             self._cancel_timer()
-            self.phase = "waiting"
-            self._await_return()
+            if self.phase == "countdown":
+                self.phase = "waiting"
+                for other in self.people:
+                    other.ready = False
+                    self.show(other)
+            self._await()
+        elif self.phase == "paused" and was_ready:
+            self._wait_for(self.spec.abandon_after_s)
 
-    def show(self) -> None:
-        """Send the whole picture and what belongs to the phase."""
-        rules = self.scene.layout.rules
-        spec = self.spec
-        self._send(
+    def show(self, person: Person) -> None:
+        """Send a person the whole picture and what belongs to the phase."""
+        if not person.here:
+            return
+        course, spec, rules = self.course, self.spec, self.course.layout.rules
+        person.send(
             "keyframe",
             phase=self.phase,
-            tick=self.kitchen.tick,
+            tick=course.kitchen.tick,
             horizon=rules.horizon_ticks,
+            episode=course.episode,
+            episodes=course.episodes,
             tick_ms=spec.tick_ms,
-            seat=spec.human_seat,
-            hats=spec.hats,
+            seat=person.seat,
+            hats=person.hats,
+            partner=spec.partner,
+            input_mode=spec.input_mode,
+            show_score=spec.show_score,
+            points=rules.delivery_reward,
             grid=self.scene.grid,
             cook_time=rules.cook_time_ticks,
             goal=spec.goal,
             round=spec.round_no,
             of=spec.of,
             tutorial=spec.tutorial,
-            **self.scene.whole(self._state),
+            **self.scene.whole(self._state, course.score_before),
         )
         if self.phase == "paused" and self._pause is not None:
             left_s = max(0, math.ceil(self._give_up_at_s - self._loop.time()))
-            self._send("paused", reason=self._pause.reason, seconds_left=left_s)
+            reason = PARTNER if person.ready else self._pause.reason
+            person.send("paused", reason=reason, seconds_left=left_s)
         elif self._ending is not None and self._ending.done():
-            self._say_ended()
+            self._say_ended(person)
 
-    def ready(self) -> None:
-        """Begin the countdown. Raises: MessageError when the round is not waiting for that."""
+    def ready(self, person: Person) -> None:
+        """Begin the countdown once all are ready. Raises: MessageError when it does not wait for that."""
         if self.phase not in ("waiting", "paused"):
             raise wire.MessageError(f"the round is not waiting for ready: it is {self.phase}")
-        self._cancel_absence()
-        self.keys.clear()
-        self.phase = "countdown"
-        self.show()
-        self._count(self.spec.countdown_s)
+        if person.ready:
+            raise wire.MessageError("the round is waiting for the other participant")
+        person.ready = True
+        if all(one.ready for one in self.people):
+            self._count_down()
+        elif self.phase == "waiting":
+            self._await()
+        else:
+            self.show(person)
 
-    def key(self, message: wire.Key, arrival_s: float) -> None:
+    def key(self, person: Person, message: wire.Key, arrival_s: float) -> None:
         """A key went down or up. Raises: MessageError when nothing is being played."""
         if self.phase not in ("countdown", "playing"):
             raise wire.MessageError(f"no key counts now: the round is {self.phase}")
+        self._in_sight(person)
         if message.down:
-            self.keys.press(message.key)
+            person.keys.press(message.key)
         else:
-            self.keys.let_go(message.key)
-        self.journal.key(message, arrival_s, self.kitchen.tick)
+            person.keys.let_go(message.key)
+        self.journal.key(message, arrival_s, self.course.ticks, person.seat)
 
-    def release(self, message: wire.Release, arrival_s: float) -> None:
+    def release(self, person: Person, message: wire.Release, arrival_s: float) -> None:
         """All keys were let go; outside of play there is none to let go of."""
+        if message.reason == "shown":
+            self._in_sight(person)
         if self.phase in ("countdown", "playing"):
-            self.keys.let_go_all()
-            self.journal.key(message, arrival_s, self.kitchen.tick)
+            if message.reason == "hidden" and person.hidden_ms is None:
+                person.hidden_ms = self._clock.ms(arrival_s)
+                self._keeping.hidden(self, person, person.hidden_ms, None)
+            person.keys.let_go_all()
+            self.journal.key(message, arrival_s, self.course.ticks, person.seat)
 
-    def ping(self, message: wire.Ping, arrival_s: float) -> None:
+    def ping(self, person: Person, message: wire.Ping, arrival_s: float) -> None:
         """Answer a ping and note it."""
-        self._send("pong", client_ms=message.client_ms, server_ms=self._clock.ms(arrival_s))
+        person.send("pong", client_ms=message.client_ms, server_ms=self._clock.ms(arrival_s))
         if self.phase != "ended":
-            self.journal.ping(message, arrival_s)
+            self.journal.ping(message, arrival_s, person.seat)
+
+    def _in_sight(self, person: Person) -> None:
+        if person.hidden_ms is not None:
+            self._keeping.hidden(self, person, person.hidden_ms, self._clock.ms())
+            person.hidden_ms = None
 
     # ---- the clock -----------------------------------------------------------------------------------------
 
     def deadline(self, tick: int) -> float:
-        """When a tick is due while playing, in seconds of the event loop's clock."""
+        """When a tick of the round is due while playing, in seconds of the event loop's clock."""
         return self._start_s + (tick - self._start_tick) * self._tick_s
+
+    def _count_down(self) -> None:
+        self._cancel_absence()
+        for person in self.people:
+            person.keys.clear()
+        self.phase = "countdown"
+        self._show_all()
+        self._count(self.spec.countdown_s)
 
     def _count(self, seconds: int) -> None:
         if seconds > 0:
-            self._send("countdown", seconds=seconds)
+            self._send_all("countdown", seconds=seconds)
             self._timer = self._loop.call_later(1.0, self._count, seconds - 1)
             return
-        self.keys.forget_waiting()
+        for person in self.people:
+            person.keys.forget_waiting()
         self.phase = "playing"
-        self._start_tick = self.kitchen.tick
+        self._start_tick = self.course.ticks
         # The first tick is due a whole tick from now at the earliest, so that keys can reach it.
         self._start_s = first_deadline(self._loop.time() + self._tick_s, self._stagger, self._tick_s)
         if self._pause is not None:
             self.journal.goes_on(self._pause)
             self._pause = None
-        self.show()
+        self._show_all()
         self._timer = self._loop.call_at(self._start_s, self._tick)
 
     def _tick(self) -> None:
-        tick = self.kitchen.tick
+        if self.journal.lost:
+            self.lose()
+            return
+        course = self.course
+        tick = course.ticks
         deadline_s = self.deadline(tick)
-        human, agent = self.spec.human_seat, 1 - self.spec.human_seat
-        answer = self._question.answer
         actions = [STAY, STAY]
-        actions[human] = self.keys.take()
-        if answer is not None and answer.action is not None:
-            actions[agent] = answer.action
+        for person in self.people:
+            actions[person.seat] = person.keys.take()
+        decision_ms, fault = None, None
+        late = False
+        for seat, question in self._questions.items():
+            answer = question.answer
+            late = answer is None
+            if answer is not None:
+                decision_ms, fault = answer.decision_ms, answer.fault
+                if answer.action is not None:
+                    actions[seat] = answer.action
         joint = (actions[0], actions[1])
         before = self._state
-        self.kitchen.step(*joint)
-        after = self._state = self.kitchen.state.copy()
-        changes = self.scene.changes(before, after)
-        text = wire.encode("tick", tick=tick + 1, events=happenings(self.kitchen.events), **changes)
+        course.step(*joint)
+        after = self._state = course.kitchen.state.copy()
+        changes = self.scene.changes(before, after, course.score_before)
+        events = happenings(course.kitchen.events)
+        text = wire.encode("tick", tick=course.kitchen.tick, events=events, **changes)
         handed = Handed()
-        if self.connection is not None:
-            self.connection.send(text, handed)
-        decision_ms, fault = (None, None) if answer is None else (answer.decision_ms, answer.fault)
-        self.journal.played(Played(tick, joint, deadline_s, self._loop.time(), handed, decision_ms, fault))
-        if self.kitchen.done:
+        for person in self.people:
+            if person.connection is not None:
+                person.connection.send(text, handed)
+        played = Played(tick, joint, deadline_s, self._loop.time(), handed, decision_ms, late, fault)
+        self.journal.played(played)
+        if course.over:
             self.end("finished")
-            return
-        self._question = self.mind.ask(tick + 1, after, (before, joint))
-        self._timer = self._loop.call_at(self.deadline(tick + 1), self._tick)
+        elif course.between:
+            self._next_episode()
+        else:
+            self._ask((before, joint))
+            self._timer = self._loop.call_at(self.deadline(tick + 1), self._tick)
+
+    def _next_episode(self) -> None:
+        self.course.next_episode()
+        self._state = self.course.kitchen.state.copy()
+        for seat, player in enumerate(self.players):
+            if not isinstance(player, Person):
+                player.restart(self.course.layout, seat, self.spec.seeds[self.course.episode - 1])
+        self._ask(None)
+        self.phase = "countdown"
+        self._show_all()
+        self._count(self.spec.countdown_s)
+
+    def _ask(self, seen: Any) -> None:
+        self._questions = {
+            seat: player.ask(self.course.kitchen.tick, self._state, seen)
+            for seat, player in enumerate(self.players)
+            if not isinstance(player, Person)
+        }
+
+    # ---- waiting for people --------------------------------------------------------------------------------
 
     def _stand_still(self, reason: str) -> None:
         self._cancel_timer()
         self.journal.write()
-        self.keys.clear()
         self.phase = "paused"
+        for person in self.people:
+            person.keys.clear()
+            if reason == RESTART:
+                person.ready = False
         if self._pause is None:
-            self._pause = self.journal.pause(self.kitchen.tick, reason)
-        self._await_return()
+            self._pause = self.journal.pause(self.course.ticks, reason)
+        self._wait_for(self.spec.abandon_after_s)
+        self._show_all()
 
-    def _await_return(self) -> None:
+    def _await(self) -> None:
+        """Before the first tick: wait so long for the other when one is ready, or for anybody to come."""
+        someone_ready = any(person.ready for person in self.people)
+        if someone_ready and self._absence is not None and all(person.here for person in self.people):
+            return
         self._cancel_absence()
-        self._give_up_at_s = self._loop.time() + self.spec.abandon_after_s
+        if someone_ready or not any(person.here for person in self.people):
+            self._wait_for(self.spec.abandon_after_s)
+
+    def _wait_for(self, seconds: float) -> None:
+        self._cancel_absence()
+        self._give_up_at_s = self._loop.time() + seconds
         self._absence = self._loop.call_at(self._give_up_at_s, self._give_up)
 
     def _give_up(self) -> None:
         self._absence = None
-        if self.phase == "paused":
+        if self.journal.lost:
+            self.lose()
+        elif self.phase == "paused" or any(person.ready for person in self.people):
+            self._without([person for person in self.people if not person.ready])
+        elif self.phase == "waiting" and not any(person.here for person in self.people):
+            self._keeping.forget(self)
+
+    def drop_out(self, person: Person) -> None:
+        """Go on without a person, who left for good."""
+        if self.phase == "ended" or person not in self.people:
+            return
+        person.ready = False
+        if self.phase == "playing" or (self.phase == "countdown" and self.course.ticks > 0):
+            self._stand_still(LEFT)
+        self._cancel_timer()
+        self._cancel_absence()
+        self._without([person], asked=True)
+
+    def _without(self, absent: Iterable[Person], *, asked: bool = False) -> None:
+        """Go on without those who did not come back, as the study says; the end when nobody is left."""
+        absent = tuple(absent)
+        there = [one for one in self.people if one not in absent and (one.ready or asked)]
+        if not there:
             self.end("abandoned")
-        elif self.phase == "waiting" and self.connection is None:
-            self._idle(self)
+        elif self.spec.dropout == END_ROUND:
+            self.left = absent
+            self.end("abandoned")
+        elif self._replacing is None:
+            self._replacing = self._loop.create_task(self._replace(absent[0]))
+
+    async def _replace(self, person: Person) -> None:
+        """An agent takes the seat of a person, who leaves the round."""
+        try:
+            mind = await self._keeping.stand_in(self, person)
+        except Exception:  # whatever keeps the agent from coming, the other person must not wait for ever
+            LOG.exception("round %d goes on with nobody", self.spec.round_id)
+            self.left = (person,)
+            self.end("abandoned")
+            return
+        finally:
+            self._replacing = None
+        if self.phase == "ended":
+            return
+        person.close(wire.CLOSE_ENDED)
+        self.players[person.seat] = mind
+        self._ask(None)
+        if all(one.ready and one.here for one in self.people):
+            self._count_down()
+        elif self.phase == "paused":
+            self._wait_for(self.spec.abandon_after_s)
+            self._show_all()
+        else:
+            self.phase = "waiting"
+            self._await()
+            self._show_all()
 
     # ---- the end -------------------------------------------------------------------------------------------
 
@@ -268,6 +427,8 @@ class Match:
             return
         self._cancel_timer()
         self._cancel_absence()
+        for person in self.people:
+            self._in_sight(person)
         self.phase = "ended"
         self.outcome = outcome
         self._ending = self._loop.create_task(self._close(outcome))
@@ -282,29 +443,50 @@ class Match:
         await asyncio.sleep(0.01)
         self.journal.write()
         try:
-            await self._finish(self, outcome)
+            await self._keeping.finish(self, outcome)
+        except LeaseLost:
+            self.lose()
+            return
         except Exception:  # the round is in the journal; opening the page again tries to close it again
             LOG.exception("round %d could not be closed", self.spec.round_id)
-            if self.connection is not None:
-                self.connection.close(wire.CLOSE_ENDED)
+            for person in self.people:
+                person.close(wire.CLOSE_ENDED)
             return
-        self._say_ended()
+        for person in self.people:
+            self._say_ended(person)
 
-    def _say_ended(self) -> None:
-        self._send("ended", outcome=self.outcome, score=self.kitchen.score, next=self.spec.next_url)
+    def _say_ended(self, person: Person) -> None:
+        outcome = "partner_left" if self.left and person not in self.left else self.outcome
+        person.send("ended", outcome=outcome, score=self.course.score, next=person.next_url)
+
+    def lose(self) -> None:
+        """Stop: another process has the round now, and this one's people with it."""
+        self._cancel_timer()
+        self._cancel_absence()
+        self.phase = "ended"
+        alone = len(self.people) == 1
+        for person in self.people:
+            if alone:
+                person.send("elsewhere")
+            person.close(wire.CLOSE_REPLACED if alone else wire.CLOSE_BUSY)
+        self._keeping.forget(self)
 
     def stop(self) -> None:
         """Stop for a shutdown: what was played is journalled, a round in play is left paused."""
-        if self.phase == "playing" or (self.phase == "countdown" and self.kitchen.tick > 0):
+        if self.phase == "playing" or (self.phase == "countdown" and self.course.ticks > 0):
             self._stand_still(RESTART)
         self._cancel_timer()
         self._cancel_absence()
 
     # ---- small parts ---------------------------------------------------------------------------------------
 
-    def _send(self, name: str, **fields: Any) -> None:
-        if self.connection is not None:
-            self.connection.send(wire.encode(name, **fields))
+    def _send_all(self, name: str, **fields: Any) -> None:
+        for person in self.people:
+            person.send(name, **fields)
+
+    def _show_all(self) -> None:
+        for person in self.people:
+            self.show(person)
 
     def _cancel_timer(self) -> None:
         if self._timer is not None:

@@ -1,49 +1,64 @@
-"""The live rounds of a serving process: set up, found again, taken up where a journal ends, closed."""
+"""The live rounds of a serving process: set up, found again, taken over where a journal ends, closed."""
 
 from __future__ import annotations
 
 import asyncio
 import json
 import logging
+import secrets
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 from weakref import WeakValueDictionary
 
-import numpy as np
-from numpy.typing import NDArray
-
 from galley.agents.catalogue import Catalogue
-from galley.agents.protocol import Agent
-from galley.kitchen import Kitchen, Layout
-from galley.records import RoundRow, Store
+from galley.kitchen import Layout
+from galley.records import Lease, NewRound, RoundRow, SeatRow, Store
+from galley.records.replay import state_bytes
 from galley.server import wire
+from galley.server.catching_up import caught_up, ready_agent
 from galley.server.clock import Clock, Stagger
+from galley.server.course import Course
 from galley.server.journal import RoundJournal
-from galley.server.match import Match, RoundSpec
+from galley.server.match import END_ROUND, Match, RoundSpec
+from galley.server.person import Person
 from galley.server.thinking import Mind, Thinking
 from galley.server.visits import Visit, Visits
-from galley.study.plan import Step
 from galley.study.progress import RoundEnded
 
 LOG = logging.getLogger(__name__)
+LEASE_S = 10.0
+"""How long a round stays with a process that gives no sign of life."""
 
 
-class Unable:
-    """Stands in for an agent that could not be made ready: each decision is a fault, so it stays."""
+class RoundBusy(Exception):
+    """The round is played at another serving process, which lives: the browser has to get there."""
 
-    def reset(self, layout: Layout, seat: int, seed: int) -> None:
-        """Nothing to begin."""
 
-    def act(self, state: NDArray[np.int16], tick: int) -> int:
-        """Never an action. Raises: RuntimeError."""
-        raise RuntimeError("the agent could not be made ready for this round")
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A participant's place in a live round."""
 
-    def observe(self, state: NDArray[np.int16], joint_action: tuple[int, int]) -> None:
-        """Nothing to note."""
+    match: Match
+    person: Person
+
+
+@dataclass(slots=True)
+class _Live:
+    """A match with the visits of its people, by seat, as far as they came here."""
+
+    match: Match
+    row: RoundRow
+    visits: dict[int, Visit] = field(default_factory=dict)
 
 
 class Matches:
-    """One match per visit that is at a round, made when its page first connects."""
+    """One match per round, made when the first of its people connects; keeps what each of them asks for.
+
+    A round belongs to one serving process at a time, by a lease in the records. A person who plays with an
+    agent and connects here takes the round along from wherever it was. A round of two people is only taken
+    once the process that had it is gone, for both must meet in one process.
+    """
 
     def __init__(
         self,
@@ -61,167 +76,314 @@ class Matches:
         self._thinking = thinking
         self._clock = clock
         self._stagger = Stagger()
-        self._live: dict[int, tuple[str, Match]] = {}
-        self._locks: WeakValueDictionary[int, asyncio.Lock] = WeakValueDictionary()
+        self._owner = secrets.token_hex(8)
+        # A database in a file has one serving process: whoever had a round before is gone.
+        self._only_server = store.engine.dialect.name == "sqlite"
+        self._live: dict[int, _Live] = {}
+        self._round_of: dict[int, tuple[str, int]] = {}
+        self._locks: WeakValueDictionary[tuple[str, int], asyncio.Lock] = WeakValueDictionary()
 
     def __len__(self) -> int:
         return len(self._live)
 
-    async def of(self, visit: Visit) -> Match | None:
-        """The match of the round a visit is at; None when it is at no round, or its round is over already."""
-        lock = self._locks.setdefault(visit.row.id, asyncio.Lock())
-        async with lock:
-            step = visit.step
-            if visit.progress.status != "active" or step.kind != "round":
-                return None
-            there = self._live.get(visit.row.id)
-            if there is not None and there[0] == step.id:
-                return there[1]
-            row = await self._row(visit, step)
-            if row.status != "open":
-                # The server stopped between closing the round and moving on.
-                await self._visits.happened(visit, RoundEnded(step.id, row.status))  # type: ignore[arg-type]
-                return None
-            match = await self._make(visit, step, row)
-            self._live[visit.row.id] = (step.id, match)
-            return match
+    async def of(self, visit: Visit) -> Place | None:
+        """The place in the round that a visit is at; None when it is at none, or its round is over already.
+
+        Raises: RoundBusy when another process has the round and keeps it.
+        """
+        step = visit.step
+        if not visit.active or step.kind != "round":
+            return None
+        there = self._place(visit)
+        if there is not None:
+            return there
+        async with self._lock("visit", visit.row.id):
+            row = await self._row(visit)
+            if row is None and step.data["partner"] != "human":
+                await self.set_up(visit, step.data["agent"])
+                row = await self._row(visit)
+        if row is None:
+            return None
+        async with self._lock("round", row.id):
+            there = self._place(visit)
+            if there is None:
+                there = await self._take_up(visit, row.id)
+        return there
+
+    async def begun(self, visit: Visit) -> bool:
+        """Whether the round that a visit is at was set up."""
+        return self._place(visit) is not None or await self._row(visit) is not None
+
+    async def with_agent(self, visit: Visit) -> bool:
+        """Whether the round that a visit is at was set up with an agent."""
+        row = await self._row(visit)
+        return row is not None and _with_agent(row)
 
     async def skip(self, visit: Visit) -> bool:
-        """Whether the round a visit is at was skipped; only some practice rounds may be."""
+        """Whether the round a visit is at was skipped; only some may be."""
         step = visit.step
-        if step.kind != "round" or not step.data["skippable"]:
+        if step.kind != "round" or not step.skippable:
             return False
-        match = await self.of(visit)
-        if match is None:
+        if not await self.begun(visit) and step.data["partner"] == "human":
+            return await self._visits.happened(visit, RoundEnded(step.id, "skipped"))
+        place = await self.of(visit)
+        if place is None:
             return False
-        match.end("skipped")
-        await match.ended()
+        await self._leave(visit, place, "skipped")
         return True
 
     async def give_up(self, visit: Visit) -> None:
         """End the round a visit is at, if it has begun, as abandoned: the visit's time is over."""
-        row = await asyncio.wrap_future(self._store.open_round(visit.row.id, visit.step.id))
-        if row is None or row.status != "open":
+        if await self.begun(visit):
+            place = await self.of(visit)
+            if place is not None:
+                await self._leave(visit, place, "abandoned")
+
+    async def _leave(self, visit: Visit, place: Place, outcome: str) -> None:
+        """End the round for one person, who alone decides about it when they play with an agent."""
+        if len(place.match.people) == 1:
+            place.match.end(outcome)
+            await place.match.ended()
             return
-        match = await self.of(visit)
-        if match is not None:
-            match.end("abandoned")
-            await match.ended()
+        place.match.drop_out(place.person)
+        await self._visits.happened(visit, RoundEnded(visit.step.id, outcome))  # type: ignore[arg-type]
 
     async def stop(self) -> None:
-        """Stop every match for a shutdown: all that was played is journalled, rounds that are over closed."""
-        for _, match in tuple(self._live.values()):
-            match.stop()
-            await match.ended()
+        """Stop every match for a shutdown: all that was played is journalled, rounds that are over closed.
+
+        Other processes may have the rounds at once.
+        """
+        for live in tuple(self._live.values()):
+            live.match.stop()
+            await live.match.ended()
+            lease = live.match.journal.lease
+            if lease is not None and live.match.phase != "ended":
+                await asyncio.wrap_future(self._store.release(lease))
 
     async def stop_visit(self, visit_id: int) -> None:
         """Stop the match of a visit that is to be erased, if it has one; the round's end is not written."""
-        there = self._live.pop(visit_id, None)
-        if there is None:
+        live = self._live.get(self._round_of.get(visit_id, ("", 0))[1])
+        if live is None:
             return
-        match = there[1]
-        connection = match.connection
-        if connection is not None:
-            connection.close(wire.CLOSE_ENDED)
-            match.leave(connection)
+        match = live.match
+        for person in match.people:
+            connection = person.connection
+            if connection is not None:
+                connection.close(wire.CLOSE_ENDED)
+                match.leave(connection)
         match.stop()
         await match.ended()
+        self.forget(match)
+        await asyncio.wrap_future(self._store.flush())
 
     # ---- setting up ----------------------------------------------------------------------------------------
 
-    async def _row(self, visit: Visit, step: Step) -> RoundRow:
-        row = await asyncio.wrap_future(self._store.open_round(visit.row.id, step.id))
-        if row is not None:
-            return row
-        data = step.data
-        bundle = self._catalogue.bundle(data["agent"])
-        layout = round_layout(self._layouts, data)
-        await asyncio.wrap_future(
-            self._store.create_round(
-                visit.row.id,
-                step.id,
-                data["round_no"],
-                json.dumps(layout.to_dict()),
-                layout.name,
-                layout.rules.horizon_ticks,
-                data["tick_ms"],
-                data["human_seat"],
-                bundle.name,
-                bundle.sha256,
-                data["partner_hat"],
-                data["seed"],
-                self._clock.ms(),
-                human_hat=data["human_hat"],
-            )
-        )
-        made = await asyncio.wrap_future(self._store.open_round(visit.row.id, step.id))
-        if made is None:
-            raise RuntimeError(f"round of visit {visit.row.id} at {step.id} vanished")
-        return made
+    async def set_up(self, visit: Visit, agent: str, *, also: Visit | None = None) -> int:
+        """The id of the round of a visit's step, set up with an agent, or with the visit `also`.
 
-    async def _make(self, visit: Visit, step: Step, row: RoundRow) -> Match:
-        data = step.data
-        agent_name = str(row.partner.agent)
-        layout = Layout.from_dict(json.loads(row.layout_json))
-        bundle = self._catalogue.bundle(agent_name)
-        if bundle.sha256 != row.partner.agent_sha256:
-            LOG.warning("round %d goes on with another version of agent %s", row.id, agent_name)
-        kitchen, agent = await asyncio.wrap_future(
-            self._thinking.do(
-                lambda: _caught_up(layout, bundle, row.partner.seat, row.seed, row.joint_actions)
-            )
+        Who is named first gets the seat of their plan.
+        """
+        data = visit.step.data
+        layout = round_layout(self._layouts, data)
+        seat = int(data["human_seat"])
+        own = SeatRow(seat, visit.row.id, visit.step.id, hat=data["human_hat"])
+        if also is not None:
+            hat = also.step.data["human_hat"]
+            other = SeatRow(1 - seat, also.row.id, also.step.id, hat=hat)
+        else:
+            bundle = self._catalogue.bundle(agent)
+            other = SeatRow(1 - seat, None, None, bundle.name, bundle.sha256, data["partner_hat"])
+        new = NewRound(
+            data["round_no"],
+            layout.name,
+            json.dumps(layout.to_dict()),
+            layout.rules.horizon_ticks,
+            data["tick_ms"],
+            data["seed"],
+            self._clock.ms(),
+            (own, other) if seat == 0 else (other, own),
+            data["episodes"],
         )
-        seat = row.human.seat
+        return await asyncio.wrap_future(self._store.set_up_round(new))
+
+    async def _row(self, visit: Visit) -> RoundRow | None:
+        return await asyncio.wrap_future(self._store.open_round(visit.row.id, visit.step.id))
+
+    async def _take_up(self, visit: Visit, round_id: int) -> Place | None:
+        """The round as this process's own, its kitchen and agents as the journal leaves them."""
+        live = self._live.get(round_id)
+        if live is None:
+            lease = await self._lease(visit, round_id)
+            row = await self._row(visit)
+            outcome = "abandoned" if row is None else _over(row, visit)
+            if row is None or outcome is not None:
+                if lease is not None:
+                    await asyncio.wrap_future(self._store.release(lease))
+                # The server stopped between closing the round and moving on, or the seat was given away.
+                await self._visits.happened(visit, RoundEnded(visit.step.id, outcome or "abandoned"))  # type: ignore[arg-type]
+                return None
+            live = self._live[round_id] = _Live(await self._make(visit, row, lease), row)
+            if _erased(row):
+                live.match.end("abandoned")
+        return self._seat(visit, live)
+
+    async def _lease(self, visit: Visit, round_id: int) -> Lease | None:
+        steal = self._only_server or visit.step.data["partner"] != "human"
+        lease = await asyncio.wrap_future(
+            self._store.lease_round(round_id, self._owner, LEASE_S, steal=steal)
+        )
+        if lease is None:
+            raise RoundBusy(f"round {round_id} is played at another server")
+        return lease
+
+    def _seat(self, visit: Visit, live: _Live) -> Place | None:
+        seat = next((seat.seat for seat in live.row.seats if seat.visit_id == visit.row.id), None)
+        person = next((one for one in live.match.people if one.seat == seat), None)
+        if person is None:
+            return None
+        data = visit.step.data
         own, other = data["human_hat"], data["partner_hat"]
+        person.hats = (own, other) if seat == 0 else (other, own)
+        person.next_url = visit.url
+        live.visits[person.seat] = visit
+        self._round_of[visit.row.id] = (visit.step.id, live.row.id)
+        return Place(live.match, person)
+
+    def _place(self, visit: Visit) -> Place | None:
+        step_id, round_id = self._round_of.get(visit.row.id, ("", 0))
+        live = self._live.get(round_id)
+        if live is None or step_id != visit.step.id:
+            return None
+        if live.match.journal.lost:
+            live.match.lose()
+            return None
+        return self._seat(visit, live)
+
+    async def _make(self, visit: Visit, row: RoundRow, lease: Lease | None) -> Match:
+        data, config = visit.step.data, visit.study.config
+        layout = Layout.from_dict(json.loads(row.layout_json))
+        seeds = tuple(data["seeds"]) if data["seed"] == row.seed else (row.seed,) * row.episodes
         spec = RoundSpec(
             round_id=row.id,
             tick_ms=row.tick_ms,
-            human_seat=seat,
-            hats=(own, other) if seat == 0 else (other, own),
             goal=None if data["goal"] is None else data["goal"]["score"],
             round_no=row.round_no,
             of=data["of"],
             tutorial=data["tutorial"],
-            countdown_s=visit.study.config.countdown_s,
-            abandon_after_s=visit.study.config.abandon_after_s,
-            next_url=visit.url,
+            countdown_s=config.countdown_s,
+            abandon_after_s=config.abandon_after_s,
+            seeds=seeds,
+            partner="agent" if _with_agent(row) and data["partner"] == "human" else data["partner"],
+            input_mode=data["input_mode"],
+            show_score=data["show_score"],
+            dropout=data.get("lobby", {}).get("dropout", END_ROUND),
         )
-
-        async def finish(match: Match, outcome: str) -> None:
-            try:
-                await self._close(visit, step, match, outcome)
-            finally:
-                self._forget(visit, match)
-
+        course = await self._think(lambda: caught_up(layout, row.episodes, row.joint_actions))
+        players: list[Person | Mind] = []
+        stood_in = {one.seat: one for one in row.stand_ins}
+        for seat in row.seats:
+            who = stood_in.get(seat.seat, seat)
+            if who.agent is not None:
+                players.append(await self._mind(who.agent, who.agent_sha256, course, seat.seat, spec, row))
+            else:
+                repeats = spec.input_mode == "hold"
+                players.append(Person(seat.seat, seat.visit_id or 0, ("", ""), visit.url, repeats=repeats))
         return Match(
             spec,
-            kitchen,
-            Mind(self._thinking, agent, agent_name),
-            RoundJournal(self._store, self._clock, row.id, seat),
+            course,
+            (players[0], players[1]),
+            RoundJournal(self._store, self._clock, row.id, lease),
             self._clock,
+            self,
             stagger=self._stagger.phase(),
-            finish=finish,
-            idle=lambda match: self._forget(visit, match),
         )
 
-    async def _close(self, visit: Visit, step: Step, match: Match, outcome: str) -> None:
-        kitchen = match.kitchen
+    async def _mind(
+        self, name: str, sha256: str | None, course: Course, seat: int, spec: RoundSpec, row: RoundRow
+    ) -> Mind:
+        bundle = self._catalogue.bundle(name)
+        if bundle.sha256 != sha256:
+            LOG.warning("round %d goes on with another version of agent %s", row.id, name)
+        agent = await self._think(lambda: ready_agent(bundle, course, seat, spec.seeds, row.joint_actions))
+        return Mind(self._thinking, agent, name)
+
+    async def _think(self, work: Any) -> Any:
+        return await asyncio.wrap_future(self._thinking.do(work))
+
+    # ---- what a match asks for -----------------------------------------------------------------------------
+
+    async def finish(self, match: Match, outcome: str) -> None:
+        """Store the end of a round and move its people on."""
+        course = match.course
+        live = self._live.get(match.spec.round_id)
+        try:
+            await asyncio.wrap_future(
+                self._store.finish_round(
+                    match.spec.round_id,
+                    outcome,
+                    course.score,
+                    course.deliveries,
+                    self._clock.ms(),
+                    state_bytes(course.last_state),
+                    lease=match.journal.lease,
+                )
+            )
+            for person in match.people:
+                visit = None if live is None else live.visits.get(person.seat)
+                if visit is not None:
+                    await self._visits.happened(visit, RoundEnded(visit.step.id, outcome))  # type: ignore[arg-type]
+        finally:
+            self.forget(match)
+
+    async def stand_in(self, match: Match, person: Person) -> Mind:
+        """An agent for the seat of somebody who left, whose visit goes on without the round."""
+        live = self._live[match.spec.round_id]
+        bundle = self._catalogue.bundle(match.spec.dropout)
+        now_ms = self._clock.ms()
         await asyncio.wrap_future(
-            self._store.finish_round(
+            self._store.stand_in(
                 match.spec.round_id,
-                outcome,
-                kitchen.score,
-                int(kitchen.view.deliveries),
-                self._clock.ms(),
-                kitchen.state.astype("<i2").tobytes(),
+                person.seat,
+                match.course.ticks,
+                bundle.name,
+                bundle.sha256,
+                now_ms,
+                match.journal.lease,
             )
         )
-        await self._visits.happened(visit, RoundEnded(step.id, outcome))  # type: ignore[arg-type]
+        visit = live.visits.pop(person.seat, None)
+        self._round_of.pop(person.visit_id, None)
+        if visit is not None:
+            await self._visits.happened(visit, RoundEnded(visit.step.id, "abandoned"))
+            row = await self._row(visit)
+        else:
+            row = await self._row(next(iter(live.visits.values())))
+        live.row = row or live.row
+        return await self._mind(bundle.name, bundle.sha256, match.course, person.seat, match.spec, live.row)
 
-    def _forget(self, visit: Visit, match: Match) -> None:
-        there = self._live.get(visit.row.id)
-        if there is not None and there[1] is match:
-            del self._live[visit.row.id]
+    def forget(self, match: Match) -> None:
+        """Let go of a match; the next connection makes it anew from the journal."""
+        live = self._live.get(match.spec.round_id)
+        if live is None or live.match is not match:
+            return
+        del self._live[match.spec.round_id]
+        if match.journal.lease is not None and match.phase != "ended":
+            self._store.release(match.journal.lease)
+        for visit_id, (_, round_id) in tuple(self._round_of.items()):
+            if round_id == match.spec.round_id:
+                del self._round_of[visit_id]
+
+    def hidden(self, match: Match, person: Person, since_ms: float, until_ms: float | None) -> None:
+        """Note that a person's page is out of sight, or was."""
+        live = self._live.get(match.spec.round_id)
+        visit = None if live is None else live.visits.get(person.seat)
+        if visit is not None:
+            self._store.hidden(visit.row.id, visit.step.id, since_ms, until_ms)
+
+    # ---- small parts ---------------------------------------------------------------------------------------
+
+    def _lock(self, what: str, number: int) -> asyncio.Lock:
+        return self._locks.setdefault((what, number), asyncio.Lock())
 
 
 def round_layout(layouts: Mapping[str, Layout], data: Mapping[str, Any]) -> Layout:
@@ -229,24 +391,18 @@ def round_layout(layouts: Mapping[str, Layout], data: Mapping[str, Any]) -> Layo
     return layouts[data["layout"]].with_rules(horizon_ticks=data["ticks"])
 
 
-def _caught_up(
-    layout: Layout, bundle: Any, seat: int, seed: int, joint_actions: NDArray[np.uint8]
-) -> tuple[Kitchen, Agent]:
-    """A kitchen in which the joint actions (uint8 [T, 2]) have happened, and an agent that has seen them."""
-    kitchen = Kitchen(layout)
-    agent: Agent
-    try:
-        agent = bundle.make()
-        agent.reset(layout, seat, seed)
-    except Exception:  # whatever a researcher's agent raises, the round goes on
-        LOG.exception("agent %s cannot be made ready for layout %s", bundle.name, layout.name)
-        agent = Unable()
-    for first, second in joint_actions.tolist():
-        before = kitchen.state.copy()
-        kitchen.step(first, second)
-        try:
-            agent.observe(before, (first, second))
-        except Exception:  # as above
-            LOG.exception("agent %s cannot take up a round on layout %s", bundle.name, layout.name)
-            agent = Unable()
-    return kitchen, agent
+def _with_agent(row: RoundRow) -> bool:
+    return any(seat.agent is not None for seat in row.seats)
+
+
+def _over(row: RoundRow, visit: Visit) -> str | None:
+    """How the round ended for a visit; None while it may be played."""
+    if row.status != "open":
+        return row.status
+    mine = next(seat.seat for seat in row.seats if seat.visit_id == visit.row.id)
+    return "abandoned" if any(one.seat == mine for one in row.stand_ins) else None
+
+
+def _erased(row: RoundRow) -> bool:
+    """Whether somebody of the round was erased from the records."""
+    return any(seat.visit_id is None and seat.agent is None for seat in row.seats)

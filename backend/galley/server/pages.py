@@ -13,11 +13,13 @@ from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Resp
 from galley.records import Store
 from galley.server.clock import Clock
 from galley.server.forms import FormError, read_form
+from galley.server.lobby import Lobby, Meeting
 from galley.server.matches import Matches
 from galley.server.origin import same_origin
 from galley.server.step_pages import (
     common_context,
     ending_context,
+    public_fallback,
     public_study,
     questionnaire_of,
     step_context,
@@ -70,6 +72,7 @@ class Pages:
         studies: Mapping[str, Study],
         visits: Visits,
         matches: Matches,
+        lobby: Lobby,
         store: Store,
         clock: Clock,
         templates: jinja2.Environment,
@@ -78,6 +81,7 @@ class Pages:
         self._studies = studies
         self._visits = visits
         self._matches = matches
+        self._lobby = lobby
         self._store = store
         self._clock = clock
         self._templates = templates
@@ -93,6 +97,7 @@ class Pages:
         router.add_api_route("/s/{study}/begin", self.begin, methods=["POST"], **shown)
         router.add_api_route("/v/{token}", self.visit, methods=["GET", "HEAD"], **shown)
         router.add_api_route("/v/{token}", self.submit, methods=["POST"], **shown)
+        router.add_api_route("/v/{token}/lobby", self.waiting, methods=["GET"], response_model=None)
         return router
 
     # ---- before a visit ------------------------------------------------------------------------------------
@@ -169,7 +174,25 @@ class Pages:
         if visit.progress.status not in ("active", "completed"):
             return self._page("ending.html", **ending_context(visit))
         await self._visits.entered(visit)
-        return self._step_page(visit)
+        if not visit.active or visit.step.data.get("partner") != "human":
+            return self._step_page(visit)
+        meeting = await self._lobby.see(visit)
+        if meeting.waiting:
+            return self._lobby_page(visit, meeting)
+        if not meeting.begun:
+            return RedirectResponse(visit.url, 303, NEVER_CACHED)
+        return self._step_page(visit, partner="agent" if meeting.alone else "human")
+
+    async def waiting(self, token: str) -> Response:
+        """Whether somebody still has to wait for a partner, and how long at most; for scripts."""
+        visit = await self._visits.find(token)
+        if visit is None:
+            return JSONResponse({"waiting": False, "seconds_left": 0}, 404, NEVER_CACHED)
+        meeting = Meeting(waiting=False)
+        if visit.active and visit.step.data.get("partner") == "human":
+            meeting = await self._lobby.see(visit)
+        answer = {"waiting": meeting.waiting, "seconds_left": meeting.seconds_left}
+        return JSONResponse(answer, 200, NEVER_CACHED)
 
     async def submit(self, request: Request, token: str) -> Response:
         """Move on by what the step's form says; a form of another step changes nothing."""
@@ -222,6 +245,8 @@ class Pages:
     async def _round_form(self, visit: Visit, form: Mapping[str, list[str]]) -> None:
         if "skip" in form:
             await self._matches.skip(visit)
+        elif "leave" in form and visit.step.data["partner"] == "human":
+            await self._lobby.leave(visit)
 
     async def _out_of_time(self, visit: Visit, happening: Happening) -> None:
         if isinstance(happening, Ended) and visit.step.kind == "round":
@@ -250,11 +275,22 @@ class Pages:
         status: int = 200,
         values: Mapping[str, Sequence[str]] | None = None,
         problems: Mapping[str, str] | None = None,
-        *,
-        early: bool = False,
+        **more: Any,
     ) -> Response:
-        context = common_context(visit, self._clock.ms()) | step_context(visit, values, problems)
-        return self._page(f"{visit.step.kind}.html", status, **context, early=early)
+        context = common_context(visit, self._clock.ms()) | step_context(visit, values, problems) | more
+        return self._page(f"{visit.step.kind}.html", status, **context)
+
+    def _lobby_page(self, visit: Visit, meeting: Meeting) -> Response:
+        context = common_context(visit, self._clock.ms()) | {
+            "seconds_left": meeting.seconds_left,
+            "waited_s": meeting.waited_s,
+            "poll": f"{visit.url}/lobby",
+            "human_hat": visit.step.data["human_hat"],
+            "fallback": public_fallback(visit.step),
+            "round_no": visit.step.data["round_no"],
+            "of": visit.step.data["of"],
+        }
+        return self._page("lobby.html", **context)
 
     def _page(self, template: str, status_code: int = 200, /, **values: Any) -> Response:
         html = self._templates.get_template(template).render(**values)

@@ -10,8 +10,8 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from galley.server import wire
 from galley.server.journal import Handed
-from galley.server.match import LEFT, RESTART, Match
-from galley.server.matches import Matches
+from galley.server.match import LEFT, RESTART
+from galley.server.matches import Matches, Place, RoundBusy
 from galley.server.origin import same_origin
 from galley.server.visits import Visits
 
@@ -31,7 +31,7 @@ class Socket:
 
     def __init__(self, websocket: WebSocket) -> None:
         self.tab = ""
-        self.match: Match | None = None
+        self.place: Place | None = None
         self._websocket = websocket
         self._loop = asyncio.get_running_loop()
         self._queue: deque[tuple[str, Handed | None]] = deque()
@@ -70,8 +70,8 @@ class Socket:
                         handed.at_s = self._loop.time()
                 if self._behind:
                     self._behind = False
-                    if self.match is not None and self.match.connection is self:
-                        self.match.show()
+                    if self.place is not None and self.place.person.connection is self:
+                        self.place.match.show(self.place.person)
                         continue
                 if self._close_code is not None:
                     await self._websocket.close(self._close_code)
@@ -120,8 +120,8 @@ class Play:
             if socket.closing:
                 await asyncio.wait([sender], timeout=CLOSE_WITHIN_S)
         finally:
-            if socket.match is not None:
-                socket.match.leave(socket, reason)
+            if socket.place is not None:
+                socket.place.match.leave(socket, reason)
             sender.cancel()
 
     async def _listen(self, websocket: WebSocket, socket: Socket, token: str) -> str:
@@ -131,7 +131,7 @@ class Play:
         last_seq = -1
         while True:
             try:
-                async with asyncio.timeout_at(hello_by_s if socket.match is None else None):
+                async with asyncio.timeout_at(hello_by_s if socket.place is None else None):
                     event = await websocket.receive()
             except TimeoutError:
                 socket.close(wire.CLOSE_REFUSED)
@@ -149,10 +149,10 @@ class Play:
                 if isinstance(message, wire.Hello):
                     if not await self._hello(socket, token, message):
                         return LEFT
-                elif socket.match is None:
+                elif socket.place is None:
                     raise wire.MessageError("the first message is hello")
                 else:
-                    _pass_on(socket.match, socket, message, arrival_s)
+                    _pass_on(socket.place, socket, message, arrival_s)
             except wire.MessageError as error:
                 socket.send(wire.encode("refused", reason=str(error)))
             if wait_s := pace.wait_s(arrival_s):
@@ -160,7 +160,7 @@ class Play:
 
     async def _hello(self, socket: Socket, token: str, hello: wire.Hello) -> bool:
         """Whether the connection goes on. Raises: MessageError for a second hello."""
-        if socket.match is not None:
+        if socket.place is not None:
             raise wire.MessageError("hello was said already")
         if hello.protocol != wire.PROTOCOL:
             socket.send(
@@ -169,26 +169,31 @@ class Play:
             socket.close(wire.CLOSE_REFUSED)
             return False
         visit = await self._visits.find(token)
-        match = None if visit is None else await self._matches.of(visit)
-        if match is None:
+        try:
+            place = None if visit is None else await self._matches.of(visit)
+        except RoundBusy:
+            socket.close(wire.CLOSE_BUSY)
+            return False
+        if place is None:
             socket.close(wire.CLOSE_ENDED)
             return False
         socket.tab = hello.tab
-        socket.match = match
-        match.join(socket)
+        socket.place = place
+        place.match.join(place.person, socket)
         return True
 
 
-def _pass_on(match: Match, socket: Socket, message: wire.Incoming, arrival_s: float) -> None:
+def _pass_on(place: Place, socket: Socket, message: wire.Incoming, arrival_s: float) -> None:
     """Give a message to the match. Raises: MessageError when it is out of turn."""
-    if match.connection is not socket:
+    match, person = place.match, place.person
+    if person.connection is not socket:
         raise wire.MessageError("this round is open in another tab")
     match message:
         case wire.Ready():
-            match.ready()
+            match.ready(person)
         case wire.Key():
-            match.key(message, arrival_s)
+            match.key(person, message, arrival_s)
         case wire.Release():
-            match.release(message, arrival_s)
+            match.release(person, message, arrival_s)
         case wire.Ping():
-            match.ping(message, arrival_s)
+            match.ping(person, message, arrival_s)

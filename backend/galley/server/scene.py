@@ -38,20 +38,23 @@ class Scene:
         row = state[: 2 * CHEF].tolist()
         return [[*self.layout.place(row[at + CELL]), row[at + FACING], row[at + HELD]] for at in (0, CHEF)]
 
-    def whole(self, state: State) -> dict[str, Any]:
-        """The parts of a keyframe that the state decides, orders included."""
+    def whole(self, state: State, score_before: int = 0) -> dict[str, Any]:
+        """The parts of a keyframe that the state decides, orders included.
+
+        `score_before` are the points of earlier episodes.
+        """
         cells = state[CELLS:].tolist()
         orders = self.layout.rules.orders
         return {
             "chefs": self.chefs(state),
             "things": [self._thing(cell, cells[cell]) for cell in self._counters if cells[cell]],
             "pots": [self._pot(cell, cells[cell]) for cell in sorted(self._pots)],
-            "score": self.score(state),
+            "score": score_before + self.score(state),
             "orders": None if orders is None else list(orders[int(state[ORDERS_DELIVERED]) :]),
         }
 
-    def changes(self, before: State, after: State) -> dict[str, Any]:
-        """The parts of a tick message that the states around it decide."""
+    def changes(self, before: State, after: State, score_before: int = 0) -> dict[str, Any]:
+        """The parts of a tick message that the states around it decide; `score_before` as in `whole`."""
         things: list[list[int]] = []
         pots: list[list[int | bool]] = []
         for cell in np.flatnonzero(before[CELLS:] != after[CELLS:]).tolist():
@@ -60,7 +63,8 @@ class Scene:
                 pots.append(self._pot(cell, value))
             else:
                 things.append(self._thing(cell, value))
-        return {"chefs": self.chefs(after), "things": things, "pots": pots, "score": self.score(after)}
+        score = score_before + self.score(after)
+        return {"chefs": self.chefs(after), "things": things, "pots": pots, "score": score}
 
     def score(self, state: State) -> int:
         """Points so far."""

@@ -32,6 +32,12 @@ def public_step(step: Step) -> dict[str, Any]:
     return {"id": step.id, "kind": step.kind, "title": step.title, **about}
 
 
+def public_fallback(step: Step) -> str:
+    """What follows when nobody comes to play, without the name of the agent that it may be."""
+    fallback: str = step.data["lobby"]["fallback"]
+    return fallback if fallback in ("exit", "go_on") else "agent"
+
+
 def questionnaire_of(visit: Visit) -> Questionnaire | None:
     """The questions that a visit's page asks, in its order; None for a page that asks nothing."""
     return visit.study.questionnaire_for(visit.step) if visit.step.kind in QUESTION_PAGES else None

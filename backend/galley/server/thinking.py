@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from galley.agents.protocol import Agent
 from galley.agents.together import act_together
-from galley.kitchen import ACTIONS
+from galley.kitchen import ACTIONS, Layout
 
 T = TypeVar("T")
 LOG = logging.getLogger(__name__)
@@ -58,7 +58,7 @@ class Mind:
 
     def __init__(self, thinking: Thinking, agent: Agent, name: str) -> None:
         self._thinking = thinking
-        self.agent = agent
+        self.agent: Agent = agent
         self.name = name
         self.newest: Question | None = None
         self.told_fault = False
@@ -76,6 +76,32 @@ class Mind:
         self.newest = question
         self._thinking.put(question)
         return question
+
+    def restart(self, layout: Layout, seat: int, seed: int) -> None:
+        """Let the agent begin the next episode, before what is asked from now on; returns at once."""
+
+        def begin() -> None:
+            try:
+                self.agent.reset(layout, seat, seed)
+            except Exception:  # whatever a researcher's agent raises, the round goes on
+                LOG.exception("agent %s cannot begin again on layout %s", self.name, layout.name)
+                self.agent = Unable()
+
+        self._thinking.do(begin)
+
+
+class Unable:
+    """Stands in for an agent that could not be made ready: each decision is a fault, so it stays."""
+
+    def reset(self, layout: Layout, seat: int, seed: int) -> None:
+        """Nothing to begin."""
+
+    def act(self, state: NDArray[np.int16], tick: int) -> int:
+        """Never an action. Raises: RuntimeError."""
+        raise RuntimeError("the agent could not be made ready for this round")
+
+    def observe(self, state: NDArray[np.int16], joint_action: tuple[int, int]) -> None:
+        """Nothing to note."""
 
 
 class Thinking:

@@ -13,12 +13,16 @@ import orjson
 PROTOCOL = 1
 MAX_MESSAGE_CHARS = 1024
 KEYS = ("up", "down", "left", "right", "interact")
-RELEASE_REASONS = ("blur", "hidden", "pagehide")
+RELEASE_REASONS = ("blur", "hidden", "shown", "pagehide")
 PHASES = ("waiting", "countdown", "playing", "paused", "ended")
-OUTCOMES = ("finished", "abandoned", "skipped")
+OUTCOMES = ("finished", "abandoned", "skipped", "partner_left")
+SHOW_SCORE = ("during", "after", "never")
+INPUT_MODES = ("hold", "press")
+PARTNERS = ("agent", "human", "none")
 CLOSE_REPLACED = 4001
 CLOSE_ENDED = 4002
 CLOSE_REFUSED = 4003
+CLOSE_BUSY = 1013  # RFC 6455 registry: try again later
 
 
 class MessageError(ValueError):
@@ -56,12 +60,18 @@ CHECKS: Mapping[str, Callable[[object], bool]] = {
     "release reason": _one_of(*RELEASE_REASONS),
     "phase": _one_of(*PHASES),
     "outcome": _one_of(*OUTCOMES),
+    "score visibility": _one_of(*SHOW_SCORE),
+    "input mode": _one_of(*INPUT_MODES),
+    "partner": _one_of(*PARTNERS),
 }
 CHOICES: Mapping[str, tuple[str, ...]] = {
     "key": KEYS,
     "release reason": RELEASE_REASONS,
     "phase": PHASES,
     "outcome": OUTCOMES,
+    "score visibility": SHOW_SCORE,
+    "input mode": INPUT_MODES,
+    "partner": PARTNERS,
 }
 
 
@@ -122,7 +132,7 @@ MESSAGES: tuple[Message, ...] = (
     Message(
         "release",
         "client",
-        "The page lost the keyboard: every held key counts as let go.",
+        "The page lost the keyboard, or is in sight again after it was not: every held key counts as let go.",
         (
             Field("reason", "release reason", "what happened to the page"),
             Field("seq", "whole number", "as in `key`"),
@@ -144,11 +154,17 @@ MESSAGES: tuple[Message, ...] = (
         "The whole kitchen: sent after hello, when a phase begins, and after a gap.",
         (
             Field("phase", "phase", "where the round is"),
-            Field("tick", "whole number", "ticks played"),
-            Field("horizon", "whole number", "ticks of the whole round"),
+            Field("tick", "whole number", "ticks played of this episode"),
+            Field("horizon", "whole number", "ticks of an episode"),
+            Field("episode", "whole number", "number of the episode, from 1"),
+            Field("episodes", "whole number", "episodes of the round"),
             Field("tick_ms", "whole number", "length of a tick, ms"),
             Field("seat", "0 or 1", "the participant's seat"),
-            Field("hats", "list", "hat colours of seat 0 and seat 1"),
+            Field("hats", "list", "hat colours of seat 0 and seat 1, as this participant sees them"),
+            Field("partner", "partner", "who plays the other seat; none: nobody, and it is not drawn"),
+            Field("input_mode", "input mode", "whether a held direction repeats"),
+            Field("show_score", "score visibility", "when the score is shown"),
+            Field("points", "whole number", "points of one soup"),
             Field(
                 "grid",
                 "list",
@@ -158,7 +174,7 @@ MESSAGES: tuple[Message, ...] = (
             Field("chefs", "list", "seat 0 and seat 1 as [x, y, facing, held]"),
             Field("things", "list", "things lying on counters as [x, y, thing]"),
             Field("pots", "list", "every pot as [x, y, kind, count, ticks, ready]"),
-            Field("score", "whole number", "points so far"),
+            Field("score", "whole number", "points so far, of all episodes"),
             Field("goal", "whole number or null", "points that earn the bonus"),
             Field("round", "whole number", "number of the round, 0 for a tutorial"),
             Field("of", "whole number", "rounds of the visit"),
@@ -177,20 +193,25 @@ MESSAGES: tuple[Message, ...] = (
         "server",
         "What one tick changed.",
         (
-            Field("tick", "whole number", "ticks played, this one included"),
+            Field("tick", "whole number", "ticks played of this episode, this one included"),
             Field("chefs", "list", "as in the keyframe"),
             Field("things", "list", "counters that changed, as [x, y, thing]; thing 0 when now empty"),
             Field("pots", "list", "pots that changed, as in the keyframe"),
-            Field("score", "whole number", "points so far"),
+            Field("score", "whole number", "points so far, of all episodes"),
             Field("events", "list", "what happened, as [kind, seat, thing, place, x, y]"),
         ),
     ),
     Message(
         "paused",
         "server",
-        "The kitchen stands still; `ready` goes on with it.",
+        "The kitchen stands still; `ready` goes on with it, unless the reason is partner.",
         (
-            Field("reason", "text", "left (the page was closed, reloaded or lost its connection) or restart"),
+            Field(
+                "reason",
+                "text",
+                "left (the page was closed, reloaded or lost its connection), restart (of the server), or "
+                "partner (the other participant is awaited)",
+            ),
             Field("seconds_left", "whole number", "seconds until the round is given up"),
         ),
     ),
@@ -202,7 +223,8 @@ MESSAGES: tuple[Message, ...] = (
             Field(
                 "outcome",
                 "outcome",
-                "finished: played to its end; abandoned: paused too long; skipped: a practice left out",
+                "finished: played to its end; abandoned: paused too long; skipped: left out; "
+                "partner_left: the other participant did not come back",
             ),
             Field("score", "whole number", "points"),
             Field("next", "text", "the page to go on to"),
