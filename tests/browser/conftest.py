@@ -67,6 +67,7 @@ def newcomer(
     yield come
     for context, watcher in watchers:
         context.close()
+        print("last messages:", watcher.received[-8:], watcher.sent[-8:])  # shown when a test fails
         assert watcher.errors == []
         assert watcher.other_hosts == set()
         assert watcher.leaks == []

@@ -138,10 +138,11 @@ class Participant:
         while cook.tick < tick:
             self.page.wait_for_timeout(3)
             news, heard = self.watcher.received[heard:], len(self.watcher.received)
-            ticked = [frame for frame in news if frame["type"] in ("tick", "keyframe")]
             assert self.watcher.alive(), "the server went silent in the middle of a round"
-            for frame in ticked:
-                cook.see(frame)
+            for frame in news:
+                if frame["type"] in ("tick", "keyframe"):
+                    cook.see(frame)
+            ticked = any(frame["type"] == "tick" for frame in news)
             if ticked and cook.tick < tick and (key := cook.next_key()):
                 self.press(key)
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import csv
 import shutil
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 from galley.server.input import MAX_WAITING
 from tests.browser.participant import Participant
@@ -18,6 +19,7 @@ ROOT = Path(__file__).parents[2]
 SECRET_NAMES = {"human-bc": "quokka", "myopic": "numbat", "stay": "wombat", "random": "bilby"}
 """Agent names that occur nowhere else, so that a page that holds one has told on an agent."""
 
+NO_CHANGES: Mapping[str, str] = MappingProxyType({})
 Rows = dict[str, list[dict[str, str]]]
 
 KEY_OF = {"north": "up", "south": "down", "east": "right", "west": "left", "interact": "interact"}
@@ -55,9 +57,17 @@ class Site:
 
 
 @contextmanager
-def open_site(folder: Path, study: Path) -> Iterator[Site]:
-    """Serve one study from a workspace of its own, every agent under a secret name."""
+def open_site(folder: Path, study: Path, changes: Mapping[str, str] = NO_CHANGES) -> Iterator[Site]:
+    """Serve one study from a workspace of its own, every agent under a secret name.
+
+    `changes` are lines of the study file with what they are to become.
+    """
     lab = _make_lab(folder / "lab", study)
+    file = lab / "studies" / study.name
+    for old, new in changes.items():
+        text = file.read_text(encoding="utf-8")
+        assert old in text
+        file.write_text(text.replace(old, new), encoding="utf-8")
     database = f"sqlite:///{folder}/records.sqlite"
     with served(lab, database) as server:
         yield Site(server.url, study.stem, database, lab)
