@@ -11,6 +11,7 @@ from galley.records import TickRow
 from tests.admin.office import NAME, PASSWORD, Office, open_office
 from tests.admin.pilot import Pilot
 from tests.browser.conftest import browser as browser
+from tests.browser.test_accessibility import barriers
 
 
 @pytest.fixture(scope="module")
@@ -81,8 +82,8 @@ def test_space_plays_to_the_end_and_stops_there(page: Page, office: Office) -> N
     page.select_option("[data-part=speed]", "8")
     page.locator("h1").click()
     page.keyboard.press("Space")
-    page.wait_for_function("document.querySelector('[data-part=tick]').textContent === '40'")
-    page.wait_for_function("document.querySelector('[data-do=play]').textContent.includes('Play')")
+    page.wait_for_function("() => document.querySelector('[data-part=tick]').textContent === '40'")
+    page.wait_for_function("() => document.querySelector('[data-do=play]').textContent.includes('Play')")
 
 
 def test_every_tick_is_in_the_table_and_the_scrubber_leads_anywhere(page: Page, office: Office) -> None:
@@ -114,7 +115,7 @@ def test_a_round_is_watched_while_it_is_played(page: Page, office: Office) -> No
     before = tick(page)
     rows = [TickRow(before + n, 4, 4, 1000.0 * n, 0.5, 3.0, False) for n in range(6)]
     office.store.journal(office.open_round, rows)
-    page.wait_for_function(f"document.querySelector('[data-part=tick]').textContent === '{before + 6}'")
+    page.wait_for_function(f"() => document.querySelector('[data-part=tick]').textContent === '{before + 6}'")
 
 
 def test_numbers_change_by_themselves(page: Page, office: Office) -> None:
@@ -127,3 +128,27 @@ def test_numbers_change_by_themselves(page: Page, office: Office) -> None:
         "before => Number(document.querySelectorAll('.numbers dd')[1].textContent) === before + 1", arg=before
     )
     assert page.evaluate("window.same")
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_finds_no_barrier_on_any_page(browser: Browser, page: Page, office: Office, scheme: str) -> None:
+    page.emulate_media(color_scheme=scheme)
+    visit = office.visits["done"].id
+    paths = ["", "/studies/short", "/studies/short/visits", "/studies/short/rounds", f"/visits/{visit}"]
+    found = {}
+    for width in (1280, 390):
+        page.set_viewport_size({"width": width, "height": 900})
+        for path in [*paths, f"/rounds/{finished_round(office)}"]:
+            page.goto(f"{office.url}/researcher{path}")
+            wide = page.evaluate(
+                "() => document.documentElement.scrollWidth - document.documentElement.clientWidth"
+            )
+            if obstacles := barriers(page):
+                found[path, width] = obstacles
+            assert wide <= 0, f"{path} is wider than {width} pixels"
+    stranger = browser.new_page(color_scheme=scheme)
+    stranger.goto(f"{office.url}/researcher/login")
+    if obstacles := barriers(stranger):
+        found["/login", 1280] = obstacles
+    stranger.close()
+    assert not found, repr(found)
