@@ -1,0 +1,216 @@
+"""Servers and databases that die in the middle of rounds: the participant goes on, and nothing is missing."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from websockets.exceptions import ConnectionClosed
+
+from galley.kitchen import Kitchen, Layout
+from galley.records import RoundRow, Store
+from galley.records.verify import verify_study
+from galley.server.scene import Scene
+from tests.postgres import Postgres, running
+from tests.server.helpers import Player
+from tests.serving import Server
+from tests.serving import served as serve
+from tests.study.workspaces import study_workspace
+
+TICK_MS = 50
+TICKS = 120
+STUDY = f"""
+format: 1
+title: One round
+seed: 4
+tick_ms: {TICK_MS}
+horizon_ticks: {TICKS}
+countdown_s: 0
+abandon_after_s: 120
+completion: {{code: ONE-1}}
+stages:
+  - {{kind: consent, text: consent}}
+  - {{kind: questionnaire, id: open, questionnaire: open}}
+  - {{kind: rounds, agents: [myopic], layouts: [{{layout: cramped_room}}]}}
+  - {{kind: debrief, text: debrief}}
+"""
+OPEN = """
+format: 1
+title: A question
+source: made for tests
+items:
+  - {id: why, kind: short_text, text: Why?}
+"""
+
+
+def lab(folder: Path) -> Path:
+    workspace = study_workspace(folder / "lab", STUDY)
+    (workspace.path / "questionnaires" / "open.yaml").write_text(OPEN, encoding="utf-8")
+    return workspace.path
+
+
+def at_the_round(server: Server) -> str:
+    """The path of a new visit that has come to its round."""
+    with httpx.Client(base_url=server.url, follow_redirects=True, timeout=30) as http:
+        path = http.post("/s/mine/begin").url.path
+        http.post(path, data={"step": "consent", "choice": "agree"})
+        page = http.post(path, data={"step": "open", "why": "soup"})
+        assert 'data-stage="round"' in page.text
+        return path
+
+
+def player(server: Server, path: str, tab: str = "tab") -> Player:
+    return Player(f"{server.url.replace('http', 'ws')}{path}/play", tab)
+
+
+def play_until(one: Player, tick: int) -> None:
+    """Play, pressing a key now and then, until this tick."""
+    one.hello()
+    one.send("ready")
+    while (now := one.until("tick")["tick"]) < tick:
+        one.key(("right", "left", "interact", "up")[now // 3 % 4], now % 3 == 0)
+
+
+def go_on(server: Server, path: str, tab: str = "tab") -> tuple[dict[str, Any], dict[str, Any]]:
+    """The first picture that a browser gets that comes back, and the end of the round it then plays."""
+    with player(server, path, tab) as one:
+        frame = one.hello()
+        one.send("ready")
+        return frame, one.until("ended")
+
+
+def until_it_goes(attempt: Callable[[], Any], seconds: float = 60.0) -> Any:
+    """What `attempt` gives once it works, as a browser that connects again and again."""
+    end = time.monotonic() + seconds
+    while True:
+        try:
+            return attempt()
+        except (OSError, ConnectionClosed, TimeoutError, httpx.HTTPError):
+            if time.monotonic() > end:
+                raise
+            time.sleep(0.2)
+
+
+def checked(database: str, path: str) -> RoundRow:
+    """The visit's round as stored: whole, replaying bit for bit, every answer there."""
+    with Store.open(database) as store:
+        visit = store.visit(path.rsplit("/", 1)[1]).result()
+        assert visit is not None
+        assert (visit.status, visit.completion_code) == ("completed", "ONE-1")
+        assert store.answers(visit.id).result() == {"open": {"why": "soup"}}
+        row = store.open_round(visit.id, "rounds-1").result()
+        assert row is not None
+        assert (row.status, len(row.joint_actions)) == ("finished", TICKS)
+        report = verify_study(store, "mine")
+        assert report.ok, str(report)
+        return row
+
+
+def debrief(server: Server, path: str) -> None:
+    assert "ONE-1" in httpx.get(server.url + path, timeout=30).text
+
+
+def ticks_of_a_second() -> int:
+    return round(1000 / TICK_MS)
+
+
+@pytest.fixture(scope="module")
+def postgres() -> Iterator[Postgres]:
+    with running() as server:
+        server.execute("CREATE DATABASE two")
+        yield server
+
+
+@pytest.fixture(scope="module")
+def pair(postgres: Postgres, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Server, Server]]:
+    """Two server processes on one database."""
+    folder = lab(tmp_path_factory.mktemp("takeover"))
+    url = postgres.url("two")
+    with ExitStack() as up:
+        yield up.enter_context(serve(folder, url)), up.enter_context(serve(folder, url))
+
+
+def test_a_participant_may_change_servers_in_mid_round(
+    postgres: Postgres, pair: tuple[Server, Server]
+) -> None:
+    one, two = pair
+    path = at_the_round(one)
+    with player(one, path, "old") as old:
+        play_until(old, 30)
+        frame, ended = go_on(two, path, "new")
+        assert (frame["phase"], ended["outcome"]) == ("paused", "finished")
+        assert old.closed_with() == 4001
+        assert old.received[-1] == {"type": "elsewhere"}
+    assert 30 - ticks_of_a_second() <= frame["tick"] <= max(m["tick"] for m in old.received if "tick" in m)
+    debrief(one, path)
+    checked(postgres.url("two"), path)
+
+
+def test_a_database_that_restarts_in_mid_round_costs_nothing(
+    postgres: Postgres, pair: tuple[Server, Server]
+) -> None:
+    path = at_the_round(pair[0])
+    with player(pair[0], path) as one:
+        play_until(one, 20)
+        postgres.stop("immediate")
+        one.until("tick", tick=60)
+        postgres.start()
+        assert one.until("ended")["outcome"] == "finished"
+        ticks = [message["tick"] for message in one.received if message["type"] == "tick"]
+    assert ticks == list(range(1, TICKS + 1)), "the participant noticed nothing"
+    debrief(pair[0], path)
+    checked(postgres.url("two"), path)
+
+
+def test_a_round_whose_server_dies_is_finished_at_another(
+    postgres: Postgres, pair: tuple[Server, Server]
+) -> None:
+    one, two = pair
+    path = at_the_round(one)
+    with player(one, path) as before:
+        play_until(before, 50)
+        one.process.kill()
+        one.process.wait()
+        before.closed_with()
+    last = max(message["tick"] for message in before.received if message["type"] == "tick")
+    frame, ended = until_it_goes(lambda: go_on(two, path))
+    assert (frame["phase"], ended["outcome"]) == ("paused", "finished")
+    assert last - ticks_of_a_second() <= frame["tick"] <= last + 1
+    debrief(two, path)
+    row = checked(postgres.url("two"), path)
+    # What had been stored of the first server's ticks is what the participant saw there.
+    shown = [message for message in before.received if message["type"] == "tick"]
+    seen = {message["tick"]: message["chefs"] for message in shown}
+    assert _chefs_after(row, frame["tick"]) == seen[frame["tick"]] == frame["chefs"]
+
+
+def _chefs_after(row: RoundRow, tick: int) -> list[list[int]]:
+    layout = Layout.from_dict(json.loads(row.layout_json))
+    kitchen = Kitchen(layout)
+    for joint in row.joint_actions[:tick].tolist():
+        kitchen.step(*joint)
+    return Scene(layout).chefs(kitchen.state)
+
+
+def test_killing_the_one_server_on_a_file_loses_a_second_at_most_and_no_answer(tmp_path: Path) -> None:
+    folder, database = lab(tmp_path), str(tmp_path / "records.sqlite")
+    with serve(folder, database) as first:
+        path = at_the_round(first)
+        with player(first, path) as before:
+            play_until(before, 50)
+            first.process.kill()
+            first.process.wait()
+            before.closed_with()
+    last = max(message["tick"] for message in before.received if message["type"] == "tick")
+    with serve(folder, database) as second:
+        frame, ended = go_on(second, path)
+        assert (frame["phase"], ended["outcome"]) == ("paused", "finished")
+        assert last - ticks_of_a_second() <= frame["tick"] <= last + 1
+        debrief(second, path)
+    checked(database, path)
