@@ -17,6 +17,7 @@ from galley.commands import (
     learn,
     researchers,
     serve,
+    simulate,
     studies,
     trajectories,
 )
@@ -34,6 +35,7 @@ app.command()(check.check)
 app.command()(init.init)
 app.command()(export.export)
 app.command()(evaluate.evaluate)
+app.command()(simulate.simulate)
 app.add_typer(trajectories.app, name="trajectories")
 app.add_typer(agents.app, name="agents")
 app.add_typer(studies.app, name="studies")

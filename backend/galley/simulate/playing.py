@@ -1,0 +1,196 @@
+"""Plays one round over its websocket: sees frames, thinks, and presses keys a moment later."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import time
+from collections.abc import Mapping
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from random import Random
+from typing import Any, Final
+
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+
+from galley.kitchen import Layout
+from galley.simulate.figures import Figures
+from galley.simulate.seen import MakeAgent, Seen
+
+CLOSE_REPLACED: Final = 4001
+CLOSE_ENDED: Final = 4002
+CLOSE_REFUSED: Final = 4003
+PROTOCOL: Final = 1
+PING_EVERY_S: Final = 1.0
+REACTION_OF_TICK: Final = (0.1, 0.4)
+"""When in a tick a key is pressed, as shares of it."""
+TAP_OF_TICK: Final = 0.3
+ANSWERED_WITHIN_TICKS: Final = 3
+"""A key whose effect is not seen by then had none that can be seen."""
+RECONNECT_S: Final = (0.2, 0.5, 1.0, 2.0, 2.0, 3.0, 3.0, 5.0, 5.0, 5.0)
+
+
+class RoundLost(Exception):
+    """The round could not be played to its end; the text says why."""
+
+
+@dataclass
+class Press:
+    """The last key pressed: when, in which tick, and the own chef then."""
+
+    at_s: float
+    tick: int
+    chef: tuple[int, ...]
+
+
+@dataclass
+class Player:
+    """Plays a round at `url` until it has ended, or until `leave_at` ticks of it are over.
+
+    `thinks` runs the agent, so that a slow one does not hold up the frames of others.
+    """
+
+    url: str
+    make: MakeAgent
+    layouts: Mapping[str, Layout]
+    rng: Random
+    figures: Figures
+    thinks: Executor
+    leave_at: int | None = None
+    outcome: str = ""
+    ticks: int = 0
+    _seen: Seen | None = None
+    _seq: int = 0
+    _phase: str = ""
+    _press: Press | None = None
+    _tick_at_s: float | None = None
+    _tick_s: float = 0.15
+
+    async def play(self) -> str:
+        """How the round ended: its outcome, `left` when the participant left, `over` when it was over before.
+
+        Raises: RoundLost when the server cannot be reached again, or turns the participant away.
+        """
+        waits = iter(RECONNECT_S)
+        while True:
+            before = self.ticks
+            try:
+                async with connect(self.url, compression=None, open_timeout=20, max_queue=64) as socket:
+                    code = await self._connected(socket)
+            except (OSError, TimeoutError, InvalidStatus, ConnectionClosed) as error:
+                code, why = 0, f"{type(error).__name__}: {error}"
+            else:
+                why = f"closed with {code}"
+            if self.outcome:
+                return self.outcome
+            if code == CLOSE_ENDED:
+                return "over"
+            if code in (CLOSE_REPLACED, CLOSE_REFUSED):
+                raise RoundLost(f"the server closed the round with {code}")
+            if self.ticks > before:
+                waits = iter(RECONNECT_S)
+            wait_s = next(waits, None)
+            if wait_s is None:
+                raise RoundLost(f"the connection was lost after {self.ticks} ticks ({why})")
+            self.figures.reconnects += 1
+            await asyncio.sleep(wait_s)
+
+    async def _connected(self, socket: ClientConnection) -> int:
+        await _send(socket, type="hello", protocol=PROTOCOL, tab=f"simulated {self.rng.getrandbits(48):x}")
+        self._seq, self._tick_at_s = 0, None
+        pinging = asyncio.create_task(self._ping(socket))
+        thinking: asyncio.Task[None] | None = None
+        try:
+            async for text in socket:
+                frame = json.loads(text)
+                ticked = self._frame(frame)
+                if frame["type"] == "ended":
+                    self.outcome = str(frame["outcome"])
+                if frame["type"] == "keyframe" and self._phase in ("waiting", "paused"):
+                    await _send(socket, type="ready")
+                if self.outcome:
+                    break
+                if ticked and (thinking is None or thinking.done()):
+                    thinking = asyncio.create_task(self._think(socket))
+        except ConnectionClosed:
+            return int(socket.close_code or 0)
+        finally:
+            for task in (pinging, thinking):
+                if task is not None:
+                    task.cancel()
+                    await asyncio.gather(task, return_exceptions=True)
+        return int(socket.close_code or 0)
+
+    def _frame(self, frame: Mapping[str, Any]) -> bool:
+        """Take a frame in; True when a tick was played and another follows."""
+        match frame["type"]:
+            case "keyframe":
+                self._phase = frame["phase"]
+                self._tick_s = frame["tick_ms"] / 1000.0
+                self._tick_at_s = None
+                if self._seen is None or self._seen.episode != frame.get("episode", 1):
+                    self._seen = Seen(frame, self.make, self.layouts, self.rng.getrandbits(31))
+                else:
+                    self._seen.look_again(frame)
+            case "tick" if self._seen is not None:
+                self._ticked(self._seen, frame)
+                return self.outcome == "" and self._seen.tick < self._seen.layout.rules.horizon_ticks
+            case "refused":
+                self.figures.refused[str(frame["reason"])] += 1
+        return False
+
+    def _ticked(self, seen: Seen, frame: Mapping[str, Any]) -> None:
+        now_s = time.monotonic()
+        if frame["tick"] != seen.tick + 1:
+            self.figures.lost_ticks += 1
+        if self._tick_at_s is not None:
+            self.figures.tick_ms.append((now_s - self._tick_at_s) * 1000.0)
+            self.figures.off_ms.append(abs(now_s - self._tick_at_s - self._tick_s) * 1000.0)
+        self._tick_at_s = now_s
+        self.ticks += 1
+        self.figures.ticks += 1
+        seen.see(frame)
+        if self._press is not None:
+            if seen.chef != self._press.chef:
+                self.figures.input_ms.append((now_s - self._press.at_s) * 1000.0)
+                self._press = None
+            elif seen.tick - self._press.tick >= ANSWERED_WITHIN_TICKS:
+                self._press = None
+        if self.leave_at is not None and self.ticks >= self.leave_at:
+            self.outcome = "left"
+
+    async def _think(self, socket: ClientConnection) -> None:
+        """Decide on what is seen now and tap that key."""
+        seen = self._seen
+        if seen is None:
+            return
+        await asyncio.sleep(self.rng.uniform(*REACTION_OF_TICK) * self._tick_s)
+        seen.state()
+        key = await asyncio.get_running_loop().run_in_executor(self.thinks, seen.decide)
+        if key is None:
+            return
+        if self._press is None:
+            self._press = Press(time.monotonic(), seen.tick, seen.chef)
+        try:
+            await self._key(socket, key, True)
+            await asyncio.sleep(TAP_OF_TICK * self._tick_s)
+            await self._key(socket, key, False)
+        except ConnectionClosed:
+            return
+
+    async def _key(self, socket: ClientConnection, key: str, down: bool) -> None:
+        seq, self._seq = self._seq, self._seq + 1
+        await _send(socket, type="key", key=key, down=down, seq=seq, client_ms=time.monotonic() * 1000.0)
+
+    async def _ping(self, socket: ClientConnection) -> None:
+        try:
+            while True:
+                await _send(socket, type="ping", client_ms=time.monotonic() * 1000.0, rtt_ms=None)
+                await asyncio.sleep(PING_EVERY_S)
+        except ConnectionClosed:
+            return
+
+
+async def _send(socket: ClientConnection, **message: Any) -> None:
+    await socket.send(json.dumps(message, separators=(",", ":")))
