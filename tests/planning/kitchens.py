@@ -5,8 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from galley.kitchen import STAY, KitchenBatch, Layout
-from galley.kitchen.codes import CELL, CHEF, FACING
+from galley.errors import GalleyError
+from galley.kitchen import STAY, KitchenBatch, Layout, Rules
+from galley.kitchen.codes import CELL, CHEF, DELIVERIES, FACING, TICK
+from galley.kitchen.trajectory import start
+from galley.planning.distances import distances
+from galley.planning.solvable import require_solvable
 
 FAR = 32000
 
@@ -36,7 +40,9 @@ class Enumeration:
     def __init__(self, layout: Layout) -> None:
         cells = [layout.cell(place) for place in layout.floor]
         self.poses = [(cell, facing) for cell in cells for facing in range(4)]
-        pairs = [(i, j) for i, (c, _) in enumerate(self.poses) for j, (d, _) in enumerate(self.poses) if c != d]
+        pairs = [
+            (i, j) for i, (c, _) in enumerate(self.poses) for j, (d, _) in enumerate(self.poses) if c != d
+        ]
         self.pairs = pairs
         number = {pair: at for at, pair in enumerate(pairs)}
         pose = {pose: at for at, pose in enumerate(self.poses)}
@@ -63,3 +69,60 @@ class Enumeration:
             if np.array_equal(nearer, cost):
                 return cost
             cost = nearer
+
+
+def furnished_kitchen(seed: int) -> Layout:
+    """A solvable kitchen of at most 6 floor cells with one order, few counters and stations all around."""
+    for again in range(1000):
+        random = np.random.default_rng((seed, again))
+        stations = "".join(random.permutation(list("PODSPOOD")))
+        bare = random_kitchen(int(random.integers(1 << 30)), most_floor=6, stations="")
+        beside = {
+            (x + dx, y + dy) for x, y in bare.floor for dx, dy in ((0, -1), (0, 1), (1, 0), (-1, 0))
+        } - set(bare.floor)
+        grid = [list(row) for row in bare.grid]
+        places = sorted(beside)
+        chosen = [places[at] for at in random.permutation(len(places))]
+        letters = stations + "DSOP" * 10
+        for (x, y), letter in zip(chosen[: max(0, len(chosen) - 2)], letters, strict=False):
+            grid[y][x] = letter
+        try:
+            rules = Rules(cook_time_ticks=3, horizon_ticks=80, orders=("onion",))
+            layout = Layout(f"furnished-{seed}", tuple("".join(row) for row in grid), rules)
+            require_solvable(distances(layout))
+        except GalleyError:
+            continue
+        return layout
+    raise AssertionError(f"no solvable kitchen for seed {seed}")
+
+
+def fewest_ticks(layout: Layout, most_states: int = 3_000_000) -> int | None:
+    """The fewest ticks until the order list is served, by search of every state; None beyond `most_states`."""
+    joint = np.array(list(np.ndindex(6, 6)), dtype=np.uint8)
+    frontier = start(layout)[None]
+    seen = np.empty(0, dtype=np.uint64)
+    orders = len(layout.rules.orders or ())
+    for tick in range(layout.rules.horizon_ticks):
+        if (frontier[:, DELIVERIES] >= orders).any():
+            return tick
+        batch = KitchenBatch(layout, len(frontier) * 36)
+        batch.states[:] = np.repeat(frontier, 36, axis=0)
+        batch.step(np.tile(joint, (len(frontier), 1)))
+        keys = _keys(batch.states)
+        _, first = np.unique(keys, return_index=True)
+        new = first[~np.isin(keys[first], seen, assume_unique=True)]
+        frontier = batch.states[new].copy()
+        seen = np.concatenate([seen, keys[new]])
+        if len(seen) > most_states:
+            return None
+    return None
+
+
+def _keys(states: NDArray[np.int16]) -> NDArray[np.uint64]:
+    """uint64[B]: a hash of each state without its tick."""
+    keys = np.zeros(len(states), dtype=np.uint64)
+    for column in range(states.shape[1]):
+        if column != TICK:
+            keys = (keys ^ (states[:, column] + 7).astype(np.uint64)) * np.uint64(0x100000001B3)
+            keys ^= keys >> np.uint64(29)
+    return keys

@@ -54,7 +54,13 @@ def compare(seed: int) -> None:
         wanted = every.costs(set0, set1)
         for at, (i, j) in enumerate(every.pairs):
             found = motion.cost((pose(i), pose(j)), (goal0, goal1))
-            assert (FAR if found is None else found) == wanted[at], (layout.grid, pose(i), pose(j), goal0, goal1)
+            assert (FAR if found is None else found) == wanted[at], (
+                layout.grid,
+                pose(i),
+                pose(j),
+                goal0,
+                goal1,
+            )
         at = int(random.integers(len(every.pairs)))
         start = tuple(pose(index) for index in every.pairs[at])
         plan = motion.plan((start[0], start[1]), (goal0, goal1))

@@ -18,10 +18,16 @@ ORDERS_AHEAD = 3
 """Orders planned for at a time when there is no order list."""
 BEYOND = 3
 """Orders after those whose likely cost counts, so that a plan leaves the kitchen prepared."""
-WIDTH = 24
-"""Nodes kept per tick in the search for a plan from the start or after one has been carried out."""
+WIDTH = 64
+"""Nodes kept per tick in the search for a plan that nobody waits for."""
+WIDTH_SMALL = 512
+"""The same in a kitchen of at most `SMALL` floor cells."""
+SMALL = 12
+WIDTH_PLAYING = 24
+"""The same for an agent's first plan and after one has been carried out."""
 WIDTH_AFRESH = 3
 """The same when the world has deviated from the plan, which may happen every tick."""
+PAIRS_SMALL = 60
 PAIRS = 16
 """Pairs of subtasks tried from each node."""
 MOST_TICKS = 300
@@ -54,7 +60,11 @@ class TeamPlanner:
         self._searches: dict[int, Search] = {}
 
     def plan(
-        self, state: NDArray[np.int16], orders: int | None = None, width: int = WIDTH, most_ticks: int = MOST_TICKS
+        self,
+        state: NDArray[np.int16],
+        orders: int | None = None,
+        width: int | None = None,
+        most_ticks: int = MOST_TICKS,
     ) -> TeamPlan:
         """The plan from `state` (int16[S]) until `orders` more soups are served, at most those of the order list.
 
@@ -67,11 +77,15 @@ class TeamPlanner:
         left = None if listed is None else len(listed) - int(state[ORDERS_DELIVERED])
         known = ORDERS_AHEAD + BEYOND if left is None else left
         wanted = min(known, ORDERS_AHEAD) if orders is None else orders
-        if wanted < 1 or width < 1 or most_ticks < 1:
+        if wanted < 1 or (width is not None and width < 1) or most_ticks < 1:
             raise GalleyError("a plan needs at least one order, one node a tick and one tick")
         beyond = max(0, min(BEYOND, known - wanted))
+        thorough = width is None and len(self.layout.floor) <= SMALL
+        if width is None:
+            width = WIDTH_SMALL if thorough else WIDTH
+        pairs = PAIRS_SMALL if thorough else PAIRS
         search = self._search(width, most_ticks)
-        node, complete = search_plan(self._brain, search, state, wanted, beyond, PAIRS)
+        node, complete = search_plan(self._brain, search, state, wanted, beyond, pairs, thorough)
         legs = []
         while search.parents[node] >= 0:
             legs.append(search.legs[node, : search.lengths[node]])
@@ -87,6 +101,7 @@ class TeamPlanner:
 
     def _search(self, width: int, ticks: int) -> Search:
         key = width * 100_000 + ticks
+        keys = 1 << min(20, (width * ticks * PAIRS).bit_length())
         if key not in self._searches:
             nodes = width * ticks
             size = self.layout.width * self.layout.height + 9
@@ -97,8 +112,8 @@ class TeamPlanner:
                 lengths=np.zeros(nodes, dtype=np.int16),
                 totals=np.zeros(nodes, dtype=np.float32),
                 counts=np.zeros(ticks, dtype=np.int32),
-                keys=np.zeros(max(4096, nodes * PAIRS * 3), dtype=np.uint64),
-                times=np.zeros(max(4096, nodes * PAIRS * 3), dtype=np.int16),
+                keys=np.zeros(keys, dtype=np.uint64),
+                times=np.zeros(keys, dtype=np.int16),
             )
         return self._searches[key]
 
@@ -149,10 +164,10 @@ class Centralized:
         plan, at = self._plan, self._at
         listed = self._planner.layout.rules.orders is not None
         if plan is None:
-            return self._planner.plan(state), 0
+            return self._planner.plan(state, width=WIDTH_PLAYING), 0
         if at >= len(plan.states) or not np.array_equal(plan.states[at], state):
             return self._planner.plan(state, width=WIDTH_AFRESH), 0
         served = state[DELIVERIES] > plan.states[0][DELIVERIES]
         if at == len(plan.joint_actions) or (served and not listed):
-            return self._planner.plan(state), 0
+            return self._planner.plan(state, width=WIDTH_PLAYING), 0
         return plan, at

@@ -44,9 +44,7 @@ class JointTables(NamedTuple):
 
 
 @kernel
-def _before(
-    joint: JointTables, poses: NDArray[int16], state: int, bumps: bool, found: NDArray[int16]
-) -> int:
+def _before(joint: JointTables, poses: NDArray[int16], state: int, bumps: bool, found: NDArray[int16]) -> int:
     """How many (state, action) of one chef may lead to `state`; written to `found` int16[9, 2]."""
     floors = joint.cell_of.size
     found[0, 0] = state

@@ -113,7 +113,9 @@ class JointMotion:
         x, y = goal
         inside = 0 <= x < self.layout.width and 0 <= y < self.layout.height
         if not inside or self.layout.tiles[y, x] == FLOOR:
-            raise GalleyError(f"{goal} is no tile to face on {self.layout.name!r}; name a station or a counter")
+            raise GalleyError(
+                f"{goal} is no tile to face on {self.layout.name!r}; name a station or a counter"
+            )
         return 1 + self.layout.cell((x, y))
 
 

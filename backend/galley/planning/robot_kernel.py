@@ -199,7 +199,9 @@ def _cost_to_go(
     if cell >= 0 or human_cell >= 0:
         together = pair_cost(brain, state, seat, cell, human_cell)
         delay = min(own, alone) + CROWDED_TICKS if together >= FAR else together - max(own, alone)
-    if brain.pots[1]:  # what must pass over counters is not in the value tables: the state machine's order decides
+    if brain.pots[
+        1
+    ]:  # what must pass over counters is not in the value tables: the state machine's order decides
         return float(own + delay + _rank(kind))
     at = world_of(brain.spec, state, kind == TAKE_SOUP or human == TAKE_SOUP)
     pots, unit = int(brain.pots[0]), brain.unit[0]
@@ -287,9 +289,7 @@ def choose(
             cost = 0.0
             for human in range(KINDS):
                 if weights[human] > 0:
-                    cost += weights[human] * _cost_to_go(
-                        brain, state, seat, kind, cell, human, cells[human]
-                    )
+                    cost += weights[human] * _cost_to_go(brain, state, seat, kind, cell, human, cells[human])
             values[kind] = max(values[kind], -cost)
             if cost < best - 1e-6:
                 best = cost
@@ -332,7 +332,9 @@ def robot_action(
     action = STAY
     if cell >= 0 or cells[human] >= 0:
         action = _toward(brain, state, seat, cell, cells[human])
-    if stuck(state, memory) or (memory[STILL] >= PATIENCE_TICKS and action == STAY and cell >= 0 and not at_work):
+    if stuck(state, memory) or (
+        memory[STILL] >= PATIENCE_TICKS and action == STAY and cell >= 0 and not at_work
+    ):
         move = _wander(brain.spec, state, seat, -1, draw)
         return action if move < 0 else move
     return action

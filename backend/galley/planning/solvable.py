@@ -42,7 +42,9 @@ def require_solvable(known: Distances) -> None:
     for station in (POT, *ingredients, DISH_DISPENSER, SERVING):
         there = tiles == station
         if not there.any():
-            raise GalleyError(f"layout {layout.name!r} has no {_NAMES[station]}; add one that a chef can reach")
+            raise GalleyError(
+                f"layout {layout.name!r} has no {_NAMES[station]}; add one that a chef can reach"
+            )
         if not (known.reachable & there).any():
             where = layout.place(int(there.argmax()))
             raise GalleyError(

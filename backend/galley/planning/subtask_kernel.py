@@ -107,9 +107,7 @@ def _with_empty_hands(
     if serves or _reaches(spec, reach, other, SERVING):
         for kind in (ONION, TOMATO):
             if spec[SPEC_ORDERS] == 0 or _open_order(spec, state, 0) == kind:
-                _sources(
-                    spec, state, reach, costs, seat, kind + SOUP_OF_KIND, not serves, TAKE_SOUP, out
-                )
+                _sources(spec, state, reach, costs, seat, kind + SOUP_OF_KIND, not serves, TAKE_SOUP, out)
     room = _free_counter(spec, state, reach, costs, seat, True) >= 0
     on_its_way = state[CHEF * other + HELD] == DISH
     if _need(spec, state, reach, seat, DISH, wanted, -1) > on_its_way:

@@ -27,7 +27,9 @@ SUBTASKS = (
     Subtask("wait", "anything", "nothing else is"),
     Subtask("take onion", "nothing", "some pot can take an onion, or the other chef needs one passed"),
     Subtask("take tomato", "nothing", "some pot can take a tomato, or the other chef needs one passed"),
-    Subtask("take dish", "nothing", "a soup cooks or is ready and no dish is on its way, or one must be passed"),
+    Subtask(
+        "take dish", "nothing", "a soup cooks or is ready and no dish is on its way, or one must be passed"
+    ),
     Subtask("take soup", "nothing", "a finished soup that the next order asks for lies on a counter"),
     Subtask("fill pot", "onion or tomato", "some pot can take it"),
     Subtask("fetch soup", "dish", "a soup cooks or is ready in a pot; who is early waits beside it"),
@@ -37,9 +39,7 @@ SUBTASKS = (
 """In the order of the kernels' codes. Source: Fontaine et al. 2021 (RSS), Fig. 9; passing and orders are ours."""
 
 
-def feasible_subtasks(
-    known: Distances, state: NDArray[np.int16], seat: int
-) -> dict[str, tuple[Place, ...]]:
+def feasible_subtasks(known: Distances, state: NDArray[np.int16], seat: int) -> dict[str, tuple[Place, ...]]:
     """For each feasible subtask of a seat in a state (int16[S]), up to three tiles to do it at, nearest first.
 
     Waiting is left out unless nothing else can be done; it has no tile.

@@ -62,6 +62,8 @@ LEG_TICKS = 96
 """The most ticks from one decision to the next interaction."""
 STRANDED_TICKS = 500.0
 """The cost to go of a state in which neither chef has anything to do."""
+PROBES = 64
+"""Places looked at for a state met before; beyond them it counts as new."""
 LATER_TICKS = 10
 """How much later a plan may end than the first one found if the kitchen is then better prepared."""
 STAGE_TICKS = 3.5
@@ -100,9 +102,14 @@ def _pass_counters(
 
 @kernel
 def team_options(
-    brain: Brain, state: NDArray[int16], seat: int, orders: int, out: NDArray[int16], summed: NDArray[int16]
-) -> None:
-    """Nothing; fills `out` int16[KINDS, 4] as `subtasks` does, with all that can serve a plan for `orders` more soups."""
+    brain: Brain, state: NDArray[int16], seat: int, orders: int, thorough: bool, out: NDArray[int16],
+    summed: NDArray[int16],
+) -> None:  # fmt: skip
+    """Nothing; fills `out` int16[KINDS, 4] as `subtasks` does, with all that can serve a plan for `orders` more soups.
+
+    A `thorough` search has more to try: dishes before a pot is begun, waiting beside a pot that is not full,
+    both chefs after the last ingredient. In a narrow beam these crowd out better plans.
+    """
     out[:] = 0
     spec, reach = brain.spec, brain.reach
     chef = CHEF * seat
@@ -134,10 +141,10 @@ def team_options(
         for kind in (ONION, TOMATO):
             if any_order or _open_order(spec, state, 0) == kind:
                 _sources(spec, state, reach, costs, seat, kind + SOUP_OF_KIND, False, TAKE_SOUP, out)
-        if begun > dishes:
+        if (max(begun, 1) if thorough else begun) > dishes:
             _sources(spec, state, reach, costs, seat, DISH, False, TAKE_DISH, out)
         for kind in (ONION, TOMATO):
-            if room[kind] > (others == kind) and soups < orders:
+            if room[kind] > (others == kind and not thorough) and soups < orders:
                 _sources(
                     spec, state, reach, costs, seat, kind, False,
                     TAKE_ONION if kind == ONION else TAKE_TOMATO, out,
@@ -147,7 +154,8 @@ def team_options(
         tile = spec[SPEC_TILES + cell]
         packed = state[CELLS + cell]
         if held == DISH:
-            if tile == POT and packed // POT_COUNT % POT_COUNT == INGREDIENTS_PER_SOUP:
+            full = packed // POT_COUNT % POT_COUNT == INGREDIENTS_PER_SOUP
+            if tile == POT and (full or thorough):  # who is early waits beside it
                 _add(out, FETCH, cell, costs)
         elif held > DISH:
             if tile == SERVING and (any_order or _open_order(spec, state, 0) == held - SOUP_OF_KIND):
@@ -176,10 +184,12 @@ def _left(brain: Brain, state: NDArray[int16], seat: int, cell: int) -> float:
 @kernel
 def _must_wait(brain: Brain, state: NDArray[int16], seat: int, cell: int) -> bool:
     """Whether interacting with the tile does nothing yet: a soup still cooks, or a pot is still full."""
-    packed = state[CELLS + cell]
-    if brain.spec[SPEC_TILES + cell] != POT or packed // POT_COUNT % POT_COUNT < INGREDIENTS_PER_SOUP:
+    if brain.spec[SPEC_TILES + cell] != POT:
         return False
-    return state[CHEF * seat + HELD] != DISH or _cooks_for(brain, state, cell) > 0
+    full = state[CELLS + cell] // POT_COUNT % POT_COUNT == INGREDIENTS_PER_SOUP
+    if state[CHEF * seat + HELD] == DISH:
+        return not full or _cooks_for(brain, state, cell) > 0
+    return bool(full)
 
 
 @kernel
@@ -252,13 +262,13 @@ def _stages(brain: Brain, state: NDArray[int16], orders: int) -> float:
 
 @kernel
 def to_go(
-    brain: Brain, state: NDArray[int16], orders: int, beyond: int, options: NDArray[int16],
+    brain: Brain, state: NDArray[int16], orders: int, beyond: int, thorough: bool, options: NDArray[int16],
     summed: NDArray[int16],
 ) -> float:  # fmt: skip
     """The estimated ticks until `orders` and `beyond` more soups are served; fills `options` int16[2, KINDS, 4]."""
     orders += beyond
-    team_options(brain, state, 0, orders, options[0], summed)
-    team_options(brain, state, 1, orders, options[1], summed)
+    team_options(brain, state, 0, orders, thorough, options[0], summed)
+    team_options(brain, state, 1, orders, thorough, options[1], summed)
     if brain.pots[1]:
         return _stages(brain, state, orders)
     best = np.inf
@@ -277,7 +287,14 @@ def to_go(
 
 @kernel
 def pair_to_go(
-    brain: Brain, state: NDArray[int16], orders: int, kind0: int, cell0: int, kind1: int, cell1: int, delay: int
+    brain: Brain,
+    state: NDArray[int16],
+    orders: int,
+    kind0: int,
+    cell0: int,
+    kind1: int,
+    cell1: int,
+    delay: int,
 ) -> float:
     """The estimated ticks until `orders` more soups are served if the chefs now take up these subtasks."""
     at = world_of(brain.spec, state, kind0 == TAKE_SOUP or kind1 == TAKE_SOUP)
@@ -360,7 +377,7 @@ def _met_before(search: Search, key: uint64, tick: int) -> bool:
     """Whether a state was met no later than at `tick`; notes it otherwise."""
     size = search.keys.size
     at = np.int64(key % uint64(size))
-    for _ in range(size):
+    for _ in range(PROBES):
         if search.keys[at] == key:
             if search.times[at] <= tick:
                 return True
@@ -390,8 +407,9 @@ def _place(search: Search, tick: int, total: float) -> int:
 
 @kernel
 def search_plan(
-    brain: Brain, search: Search, start: NDArray[int16], orders: int, beyond: int, pairs: int
-) -> tuple[int, bool]:
+    brain: Brain, search: Search, start: NDArray[int16], orders: int, beyond: int, pairs: int,
+    thorough: bool,
+) -> tuple[int, bool]:  # fmt: skip
     """(node, whether it is the end): the last node of the best plan for `orders` more soups from `start`.
 
     With `beyond` more orders to follow the plan is the one after which those are likely to be served soonest.
@@ -439,7 +457,7 @@ def search_plan(
             if tick > 0 and search.totals[node] - tick < best_left:
                 best_left = search.totals[node] - tick
                 best_node = node
-            to_go(brain, now, left, beyond, options, summed)
+            to_go(brain, now, left, beyond, thorough, options, summed)
             found = _rate_pairs(brain, now, left + beyond, options, rated, which, summed, ahead)
             order = np.argsort(rated[:found])
             for index in range(min(pairs, found)):
@@ -459,7 +477,7 @@ def search_plan(
                     still = max(0, orders - (state[DELIVERIES] - served))
                     total = float(then)
                     if still + beyond > 0:
-                        total += to_go(brain, state, still, beyond, ahead, summed)
+                        total += to_go(brain, state, still, beyond, thorough, ahead, summed)
                     new = _place(search, then, total)
                     if new >= 0:
                         search.states[new] = state

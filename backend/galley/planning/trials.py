@@ -40,7 +40,5 @@ def run(
     """
     joint_actions = np.zeros((len(seeds), layout.rules.horizon_ticks, 2), dtype=np.uint8)
     ticks = np.zeros(len(seeds), dtype=np.int16)
-    run_trials(
-        brain(layout, seat), ROBOTS[robot], seat, epsilon, robot_epsilon, seeds, joint_actions, ticks
-    )
+    run_trials(brain(layout, seat), ROBOTS[robot], seat, epsilon, robot_epsilon, seeds, joint_actions, ticks)
     return Trials(joint_actions, ticks)
