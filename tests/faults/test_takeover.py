@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -17,14 +18,15 @@ from galley.kitchen import Kitchen, Layout
 from galley.records import RoundRow, Store
 from galley.records.verify import verify_study
 from galley.server.scene import Scene
+from galley.workspace import Workspace
 from tests.postgres import Postgres, running
-from tests.server.helpers import Player
+from tests.server.helpers import Player, Served, serving
 from tests.serving import Server
 from tests.serving import served as serve
 from tests.study.workspaces import study_workspace
 
-TICK_MS = 50
-TICKS = 120
+TICK_MS = 40
+TICKS = 100
 STUDY = f"""
 format: 1
 title: One round
@@ -49,10 +51,36 @@ items:
 """
 
 
+BOTH = (
+    STUDY.replace("title: One round", "title: Two cooks")
+    .replace("agents: [myopic]", "agents: [human]")
+    .replace("  - {kind: questionnaire, id: open, questionnaire: open}\n", "")
+)
+
+
 def lab(folder: Path) -> Path:
     workspace = study_workspace(folder / "lab", STUDY)
     (workspace.path / "questionnaires" / "open.yaml").write_text(OPEN, encoding="utf-8")
+    (workspace.path / "studies" / "both.yaml").write_text(BOTH, encoding="utf-8")
     return workspace.path
+
+
+def two_at_the_round(server: Server | Served) -> tuple[str, str]:
+    """The paths of two new visits that were paired."""
+    with httpx.Client(base_url=server.url, follow_redirects=True, timeout=30) as http:
+        paths = [http.post("/s/both/begin").url.path for _ in range(2)]
+        for path in paths:
+            http.post(path, data={"step": "consent", "choice": "agree"})
+        assert all('data-stage="round"' in http.get(path).text for path in paths)
+    return paths[0], paths[1]
+
+
+def play_together(one: Player, two: Player, tick: int) -> None:
+    one.hello()
+    two.hello()
+    one.send("ready")
+    two.send("ready")
+    one.until("tick", tick=tick)
 
 
 def at_the_round(server: Server) -> str:
@@ -65,7 +93,7 @@ def at_the_round(server: Server) -> str:
         return path
 
 
-def player(server: Server, path: str, tab: str = "tab") -> Player:
+def player(server: Server | Served, path: str, tab: str = "tab") -> Player:
     return Player(f"{server.url.replace('http', 'ws')}{path}/play", tab)
 
 
@@ -110,6 +138,18 @@ def checked(database: str, path: str) -> RoundRow:
         report = verify_study(store, "mine")
         assert report.ok, str(report)
         return row
+
+
+def whole(database: str, study: str, path: str) -> None:
+    """The visit's round has every tick and replays bit for bit."""
+    with Store.open(database) as store:
+        visit = store.visit(path.rsplit("/", 1)[1]).result()
+        assert visit is not None
+        row = store.open_round(visit.id, "rounds-1").result()
+        assert row is not None
+        assert (row.status, len(row.joint_actions)) == ("finished", TICKS)
+        report = verify_study(store, study)
+        assert report.ok, str(report)
 
 
 def debrief(server: Server, path: str) -> None:
@@ -168,12 +208,29 @@ def test_a_database_that_restarts_in_mid_round_costs_nothing(
     checked(postgres.url("two"), path)
 
 
+def test_a_round_of_two_people_stays_with_its_server_while_that_lives(
+    postgres: Postgres, pair: tuple[Server, Server]
+) -> None:
+    paths = two_at_the_round(pair[0])
+    with player(pair[0], paths[0]) as one:
+        with player(pair[0], paths[1]) as two:
+            play_together(one, two, 20)
+        assert one.until("paused")["reason"] == "partner"
+        with player(pair[1], paths[1]) as astray:
+            astray.send("hello", protocol=1, tab="tab")
+            assert astray.closed_with() == 1013
+        _, ended = go_on(pair[0], paths[1])
+        assert ended["outcome"] == one.until("ended")["outcome"] == "finished"
+    whole(postgres.url("two"), "both", paths[0])
+
+
 def test_a_round_whose_server_dies_is_finished_at_another(
     postgres: Postgres, pair: tuple[Server, Server]
 ) -> None:
     one, two = pair
-    path = at_the_round(one)
-    with player(one, path) as before:
+    path, paths = at_the_round(one), two_at_the_round(one)
+    with player(one, path) as before, player(one, paths[0]) as left, player(one, paths[1]) as right:
+        play_together(left, right, 5)
         play_until(before, 50)
         one.process.kill()
         one.process.wait()
@@ -184,6 +241,11 @@ def test_a_round_whose_server_dies_is_finished_at_another(
     assert last - ticks_of_a_second() <= frame["tick"] <= last + 1
     debrief(two, path)
     row = checked(postgres.url("two"), path)
+    # Two people both get there once the dead server's lease has run out.
+    with ThreadPoolExecutor(2) as people:
+        ends = people.map(lambda path: until_it_goes(lambda: go_on(two, path))[1]["outcome"], paths)
+    assert list(ends) == ["finished", "finished"]
+    whole(postgres.url("two"), "both", paths[0])
     # What had been stored of the first server's ticks is what the participant saw there.
     shown = [message for message in before.received if message["type"] == "tick"]
     seen = {message["tick"]: message["chefs"] for message in shown}
@@ -214,3 +276,18 @@ def test_killing_the_one_server_on_a_file_loses_a_second_at_most_and_no_answer(t
         assert last - ticks_of_a_second() <= frame["tick"] <= last + 1
         debrief(second, path)
     checked(database, path)
+
+
+def test_a_server_that_is_shut_down_gives_its_rounds_back_at_once(postgres: Postgres, tmp_path: Path) -> None:
+    postgres.execute("CREATE DATABASE calm")
+    workspace, url = Workspace(lab(tmp_path)), postgres.url("calm")
+    with serving(workspace, url) as first:
+        paths = two_at_the_round(first)
+        with player(first, paths[0]) as one, player(first, paths[1]) as two:
+            play_together(one, two, 10)
+    with serving(workspace, url) as second, player(second, paths[0]) as one, player(second, paths[1]) as two:
+        assert [back.hello()["phase"] for back in (one, two)] == ["paused", "paused"], "no wait for the lease"
+        one.send("ready")
+        two.send("ready")
+        assert one.until("ended")["outcome"] == "finished"
+    whole(url, "both", paths[0])

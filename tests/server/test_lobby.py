@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
 from galley.records import RoundRow, queries
 from galley.records.tables import KEYS
 from galley.records.verify import verify_study
-from tests.server.helpers import Participant, Served, serving, together, wait_until
+from tests.server.helpers import Participant, Player, Served, serving, together, wait_until
 from tests.server.test_flow import earlier, row_of
 from tests.study.workspaces import study_workspace
 
@@ -201,3 +202,26 @@ def test_many_arrive_at_once_and_each_is_paired_once(served: Served) -> None:
         rows = [queries.round_row(connection, number) for number in ids]
     seated = [seat.visit_id for row in rows for seat in row.seats]
     assert sorted(seated) == sorted(row_of(person).id for person in people)
+
+
+def test_a_round_of_two_goes_on_after_a_restart_once_both_are_back(tmp_path: Path) -> None:
+    workspace = study_workspace(tmp_path / "lab", PAIR.replace("abandon_after_s: 1", "abandon_after_s: 60"))
+    database = tmp_path / "records.sqlite"
+    with serving(workspace, database) as up:
+        first, second = pair(up)
+        with first.play("a") as one, second.play("b") as two:
+            one.hello()
+            two.hello()
+            one.send("ready")
+            two.send("ready")
+            one.until("tick", tick=5)
+            paths = [first.path, second.path]
+    with serving(workspace, database) as up:
+        url = up.url.replace("http", "ws")
+        with Player(f"{url}{paths[0]}/play", "a") as one, Player(f"{url}{paths[1]}/play", "b") as two:
+            assert one.hello()["phase"] == two.hello()["phase"] == "paused"
+            one.send("ready")
+            assert one.until("paused", reason="partner")
+            two.send("ready")
+            assert one.until("ended")["outcome"] == two.until("ended")["outcome"] == "finished"
+        assert verify_study(up.store, "mine").ok

@@ -77,7 +77,7 @@ class Matches:
         self._clock = clock
         self._stagger = Stagger()
         self._owner = secrets.token_hex(8)
-        # A database in a file has one serving process: whoever had a round before is gone.
+        # A database in a file has one serving process, so that nobody else can have its rounds.
         self._only_server = store.engine.dialect.name == "sqlite"
         self._live: dict[int, _Live] = {}
         self._round_of: dict[int, tuple[str, int]] = {}
@@ -228,7 +228,10 @@ class Matches:
         return self._seat(visit, live)
 
     async def _lease(self, visit: Visit, round_id: int) -> Lease | None:
-        steal = self._only_server or visit.step.data["partner"] != "human"
+        """The right to write the round; None where no other process could have it."""
+        if self._only_server:
+            return None
+        steal = visit.step.data["partner"] != "human"
         lease = await asyncio.wrap_future(
             self._store.lease_round(round_id, self._owner, LEASE_S, steal=steal)
         )

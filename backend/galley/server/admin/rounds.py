@@ -9,8 +9,8 @@ from fastapi import Request
 from fastapi.responses import JSONResponse, Response
 
 from galley.errors import GalleyError
-from galley.records import RoundRow, overview, queries
-from galley.records.rows import SessionRow
+from galley.records import overview, queries
+from galley.records.rows import RoundRow, SessionRow
 from galley.records.tables import TICKS
 from galley.server.admin.desk import Desk, number
 from galley.server.admin.gate import NEVER_CACHED
