@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import socket
+import subprocess
+import sys
 from pathlib import Path
 
+import httpx
 import pytest
 
 from galley.errors import GalleyError, InvalidFiles
@@ -54,3 +58,26 @@ def test_a_study_that_is_wrong_or_missing(tmp_path: Path) -> None:
 def test_a_setting_in_the_environment_that_is_not_possible(tmp_path: Path) -> None:
     with pytest.raises(GalleyError, match="PORT: 'x' is not possible"):
         serve(tmp_path, environ={"PORT": "x"})
+
+
+def test_a_preview_walks_a_study_and_leaves_nothing_behind(tmp_path: Path) -> None:
+    lab = study_workspace(tmp_path / "lab", ONE_ROUND)
+    before = sorted(lab.path.rglob("*"))
+    scratch = tmp_path / "scratch"
+    scratch.mkdir()
+    command = [sys.executable, "-c", "from galley.cli import main; main()", "studies", "preview", "mine"]
+    environ = {**os.environ, "TMPDIR": str(scratch)}
+    process = subprocess.Popen(
+        [*command, lab.path, "--port", "0"], stdout=subprocess.PIPE, env=environ, text=True
+    )
+    try:
+        assert process.stdout is not None
+        url = process.stdout.readline().strip()
+        page = httpx.post(f"{url}/s/mine/begin", follow_redirects=True, timeout=30)
+        assert "Test visit" in page.text
+        assert list(scratch.rglob("preview.sqlite"))
+    finally:
+        process.terminate()
+        process.communicate(timeout=30)
+    assert not list(scratch.rglob("preview.sqlite"))
+    assert [path for path in sorted(lab.path.rglob("*")) if "__pycache__" not in str(path)] == before
