@@ -6,7 +6,6 @@ import asyncio
 import logging
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Any, Protocol
 
 from galley.kitchen import STAY
@@ -16,6 +15,7 @@ from galley.server.clock import Clock, first_deadline
 from galley.server.course import Course
 from galley.server.journal import Handed, Played, RoundJournal
 from galley.server.person import Connection, Person
+from galley.server.round_spec import END_ROUND, RoundSpec, picture
 from galley.server.scene import Scene, happenings
 from galley.server.thinking import Mind, Question
 
@@ -23,30 +23,6 @@ LOG = logging.getLogger(__name__)
 LEFT = "left"
 RESTART = "restart"
 PARTNER = "partner"
-END_ROUND = "end_round"
-
-
-@dataclass(frozen=True, slots=True)
-class RoundSpec:
-    """What is fixed about a round before it is played, besides its kitchen and who plays.
-
-    `seeds` are those of the agent's episodes; `dropout` is what follows when one of two people does not come
-    back: END_ROUND, or the name of the agent that takes the seat.
-    """
-
-    round_id: int
-    tick_ms: int
-    goal: int | None
-    round_no: int
-    of: int
-    tutorial: bool
-    countdown_s: int
-    abandon_after_s: float
-    seeds: tuple[int, ...] = (0,)
-    partner: str = "agent"
-    input_mode: str = "hold"
-    show_score: str = "during"
-    dropout: str = END_ROUND
 
 
 class Keeping(Protocol):
@@ -166,29 +142,8 @@ class Match:
         """Send a person the whole picture and what belongs to the phase."""
         if not person.here:
             return
-        course, spec, rules = self.course, self.spec, self.course.layout.rules
-        person.send(
-            "keyframe",
-            phase=self.phase,
-            tick=course.kitchen.tick,
-            horizon=rules.horizon_ticks,
-            episode=course.episode,
-            episodes=course.episodes,
-            tick_ms=spec.tick_ms,
-            seat=person.seat,
-            hats=person.hats,
-            partner=spec.partner,
-            input_mode=spec.input_mode,
-            show_score=spec.show_score,
-            points=rules.delivery_reward,
-            grid=self.scene.grid,
-            cook_time=rules.cook_time_ticks,
-            goal=spec.goal,
-            round=spec.round_no,
-            of=spec.of,
-            tutorial=spec.tutorial,
-            **self.scene.whole(self._state, course.score_before),
-        )
+        whole = self.scene.whole(self._state, self.course.score_before)
+        person.send("keyframe", **picture(self.spec, self.scene, self.course, self.phase, person), **whole)
         if self.phase == "paused" and self._pause is not None:
             left_s = max(0, math.ceil(self._give_up_at_s - self._loop.time()))
             reason = PARTNER if person.ready else self._pause.reason

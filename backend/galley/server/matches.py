@@ -20,8 +20,9 @@ from galley.server.catching_up import caught_up, ready_agent
 from galley.server.clock import Clock, Stagger
 from galley.server.course import Course
 from galley.server.journal import RoundJournal
-from galley.server.match import END_ROUND, Match, RoundSpec
+from galley.server.match import Match
 from galley.server.person import Person
+from galley.server.round_spec import END_ROUND, RoundSpec
 from galley.server.thinking import Mind, Thinking
 from galley.server.visits import Visit, Visits
 from galley.study.progress import RoundEnded
