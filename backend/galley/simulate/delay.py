@@ -42,7 +42,8 @@ async def delayed(url: str, delay_s: float, heard: Heard | None = None) -> Async
             ends.append(there)
             ways = [_pipe(reader, there, delay_s), _pipe(there_reader, writer, delay_s, copy)]
             await asyncio.gather(*ways)
-        except OSError:
+        except (OSError, asyncio.CancelledError):
+            # Cancelled below, when the line is taken down: asyncio's streams would log that as an error.
             return
         finally:
             for end in ends:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import asyncio
 import json
 import time
+from collections import deque
 from collections.abc import Mapping
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from random import Random
 from typing import Any, Final
 
@@ -26,22 +27,13 @@ PING_EVERY_S: Final = 1.0
 REACTION_OF_TICK: Final = (0.1, 0.4)
 """When in a tick a key is pressed, as shares of it."""
 TAP_OF_TICK: Final = 0.3
-ANSWERED_WITHIN_TICKS: Final = 3
+ANSWERED_WITHIN_S: Final = 3.0
 """A key whose effect is not seen by then had none that can be seen."""
 RECONNECT_S: Final = (0.2, 0.5, 1.0, 2.0, 2.0, 3.0, 3.0, 5.0, 5.0, 5.0)
 
 
 class RoundLost(Exception):
     """The round could not be played to its end; the text says why."""
-
-
-@dataclass
-class Press:
-    """The last key pressed: when, in which tick, and the own chef then."""
-
-    at_s: float
-    tick: int
-    chef: tuple[int, ...]
 
 
 @dataclass
@@ -63,7 +55,7 @@ class Player:
     _seen: Seen | None = None
     _seq: int = 0
     _phase: str = ""
-    _press: Press | None = None
+    _presses: deque[tuple[float, str]] = field(default_factory=deque)
     _tick_at_s: float | None = None
     _tick_s: float = 0.15
 
@@ -150,15 +142,24 @@ class Player:
         self._tick_at_s = now_s
         self.ticks += 1
         self.figures.ticks += 1
+        before = seen.facing
         seen.see(frame)
-        if self._press is not None:
-            if seen.chef != self._press.chef:
-                self.figures.input_ms.append((now_s - self._press.at_s) * 1000.0)
-                self._press = None
-            elif seen.tick - self._press.tick >= ANSWERED_WITHIN_TICKS:
-                self._press = None
+        if seen.facing != before:
+            self._turned(seen.facing, now_s)
         if self.leave_at is not None and self.ticks >= self.leave_at:
             self.outcome = "left"
+
+    def _turned(self, key: str, now_s: float) -> None:
+        """The own chef turns the way of this key: the first such press still unanswered did it.
+
+        Presses take effect in their order, so those before it had none that can be seen.
+        """
+        while self._presses and now_s - self._presses[0][0] > ANSWERED_WITHIN_S:
+            self._presses.popleft()
+        if any(pressed == key for _, pressed in self._presses):
+            while (press := self._presses.popleft())[1] != key:
+                pass
+            self.figures.input_ms.append((now_s - press[0]) * 1000.0)
 
     async def _think(self, socket: ClientConnection) -> None:
         """Decide on what is seen now and tap that key."""
@@ -170,8 +171,7 @@ class Player:
         key = await asyncio.get_running_loop().run_in_executor(self.thinks, seen.decide)
         if key is None:
             return
-        if self._press is None:
-            self._press = Press(time.monotonic(), seen.tick, seen.chef)
+        self._presses.append((time.monotonic(), key))
         try:
             await self._key(socket, key, True)
             await asyncio.sleep(TAP_OF_TICK * self._tick_s)

@@ -69,6 +69,11 @@ class Seen:
         """The own chef as (x, y, facing, held)."""
         return tuple(self._chefs[self.seat])
 
+    @property
+    def facing(self) -> str:
+        """The key of the way that the own chef faces."""
+        return KEY_OF[self.chef[2]]
+
     def state(self) -> NDArray[np.int16]:
         """The kitchen's state, as far as it can be seen."""
         if self._state is None:
