@@ -11,6 +11,7 @@ from galley.kitchen import EAST, NORTH, STAY, WEST, Kitchen, Layout
 from galley.records import Lease, LeaseLost
 from galley.server import wire
 from galley.server.catching_up import caught_up
+from galley.server.match import MAX_ABSENCES
 from tests.server.rounds import LAYOUT, Round, Tab, run, until_tick
 
 
@@ -106,6 +107,20 @@ def test_a_page_out_of_sight_is_noted_until_it_is_seen_again() -> None:
             (0, ms[2], None),
             (0, ms[2], pytest.approx(ms[3])),
         ]
+
+    run(test())
+
+
+def test_a_page_that_flickers_is_not_recorded_without_end() -> None:
+    async def test() -> None:
+        round_ = Round(horizon=9)
+        round_.join(Tab())
+        round_.ready()
+        await until_tick(round_, 2)
+        for _ in range(500):
+            round_.release("hidden")
+            round_.release("shown")
+        assert len(round_.away) == 2 * MAX_ABSENCES
 
     run(test())
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from concurrent.futures import Future
 
 import httpx
 import pytest
 
+from galley.errors import GalleyError
 from galley.kitchen import Kitchen, Layout
 from galley.records import queries
 from galley.records.tables import RESPONSES, STAGES
@@ -264,3 +266,20 @@ def test_health_says_whether_records_are_written(served: Served) -> None:
     answer = http.get("/healthz")
     assert answer.status_code == 200
     assert answer.json()["ok"] is True
+
+
+def test_records_that_cannot_be_reached_are_told_politely(
+    served: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    away: Future[None] = Future()
+    away.set_exception(GalleyError("the records cannot be reached: no route to host"))
+    person = Participant(served)
+    monkeypatch.setattr(served.store, "read", lambda query: away)
+    page = person.load()
+    assert page.status_code == 503
+    assert page.headers["retry-after"] == "5"
+    assert "frame-ancestors 'none'" in page.headers["content-security-policy"]
+    assert "no route" not in page.text
+    assert "load this page again" in page.text
+    monkeypatch.undo()
+    assert person.load().status_code == 200

@@ -23,6 +23,8 @@ LOG = logging.getLogger(__name__)
 LEFT = "left"
 RESTART = "restart"
 PARTNER = "partner"
+MAX_ABSENCES = 200
+"""So many a person and round are recorded: each is a write of its own."""
 
 
 class Keeping(Protocol):
@@ -181,7 +183,8 @@ class Match:
         if message.reason == "shown":
             self._in_sight(person)
         if self.phase in ("countdown", "playing"):
-            if message.reason == "hidden" and person.hidden_ms is None:
+            if message.reason == "hidden" and person.hidden_ms is None and person.absences < MAX_ABSENCES:
+                person.absences += 1
                 person.hidden_ms = self._clock.ms(arrival_s)
                 self._keeping.hidden(self, person, person.hidden_ms, None)
             person.keys.let_go_all()

@@ -13,7 +13,7 @@ from weakref import WeakValueDictionary
 
 from galley.agents.catalogue import Catalogue
 from galley.kitchen import Layout
-from galley.records import Lease, NewRound, RoundRow, SeatRow, Store
+from galley.records import Lease, NewRound, RoundRow, SeatRow, Store, queries
 from galley.records.replay import state_bytes
 from galley.server import wire
 from galley.server.catching_up import caught_up, ready_agent
@@ -113,11 +113,11 @@ class Matches:
 
     async def begun(self, visit: Visit) -> bool:
         """Whether the round that a visit is at was set up."""
-        return self._place(visit) is not None or await self._row(visit) is not None
+        return self._place(visit) is not None or await self._glance(visit) is not None
 
     async def with_agent(self, visit: Visit) -> bool:
         """Whether the round that a visit is at was set up with an agent."""
-        row = await self._row(visit)
+        row = await self._glance(visit)
         return row is not None and _with_agent(row)
 
     async def skip(self, visit: Visit) -> bool:
@@ -206,6 +206,13 @@ class Matches:
             data["episodes"],
         )
         return await asyncio.wrap_future(self._store.set_up_round(new))
+
+    async def _glance(self, visit: Visit) -> RoundRow | None:
+        """The round as far as it is committed, without troubling the writer: pages ask often."""
+        at_step = visit.row.id, visit.step.id
+        return await asyncio.wrap_future(
+            self._store.read(lambda connection: queries.round_of(connection, *at_step))
+        )
 
     async def _row(self, visit: Visit) -> RoundRow | None:
         return await asyncio.wrap_future(self._store.open_round(visit.row.id, visit.step.id))

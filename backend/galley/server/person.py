@@ -38,6 +38,7 @@ class Person:
         self.connection: Connection | None = None
         self.ready = False
         self.hidden_ms: float | None = None
+        self.absences = 0
 
     @property
     def here(self) -> bool:
