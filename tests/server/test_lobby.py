@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from galley.records import RoundRow, queries
+from galley.records.erase import erase_participant
 from galley.records.tables import KEYS
 from galley.records.verify import verify_study
 from tests.server.helpers import Participant, Player, Served, serving, together, wait_until
@@ -225,3 +226,14 @@ def test_a_round_of_two_goes_on_after_a_restart_once_both_are_back(tmp_path: Pat
             two.send("ready")
             assert one.until("ended")["outcome"] == two.until("ended")["outcome"] == "finished"
         assert verify_study(up.store, "mine").ok
+
+
+def test_when_one_is_erased_the_round_is_over_for_the_other(served: Served) -> None:
+    first, second = pair(served)
+    served.store.end_visit(row_of(first).id, "expired", 0).result()
+    erase_participant(served.store, row_of(first).id)
+    with second.play() as player:
+        player.hello()
+        assert player.until("ended")["outcome"] == "abandoned"
+    second.load()
+    assert second.stage == "debrief"
