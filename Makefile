@@ -4,6 +4,7 @@
 
 PORT ?= 8000
 DATABASE ?=
+STUDY ?= demo
 VENV := .venv
 PY := $(VENV)/bin/python
 GALLEY := $(VENV)/bin/galley
@@ -15,8 +16,8 @@ NODE := node_modules/.installed
 help: ## list the targets
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /\1|/' | awk -F'|' '{printf "make %-8s %s\n", $$1, $$2}'
 
-serve: $(BASE) ## set up without PyTorch, then serve the demo study (PORT=8000 DATABASE=sqlite:///file)
-	@$(GALLEY) serve . --port $(PORT) $(if $(DATABASE),--database '$(DATABASE)')
+serve: $(BASE) ## set up without PyTorch, then serve the demo study (PORT=8000 DATABASE=sqlite:///file; STUDY= for all)
+	@$(GALLEY) serve . $(if $(STUDY),--study $(STUDY)) --port $(PORT) $(if $(DATABASE),--database '$(DATABASE)')
 
 test: $(ALL) ## set up everything, then run the tests
 	@sh tests/chromium.sh > /dev/null
