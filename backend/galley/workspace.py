@@ -101,3 +101,16 @@ class Workspace:
             if (candidate / "layouts").is_dir() and (candidate / "studies").is_dir():
                 return candidate
         raise GalleyError("this installation of Galley holds no starter workspace; install it again")
+
+
+def frontend_folder() -> Path:
+    """Where templates, styles, scripts and sprites are: in the installed package, or in a checkout.
+
+    Raises:
+        GalleyError: this installation has none.
+    """
+    package = Path(__file__).resolve().parent
+    for folder in (package / "_frontend", package.parents[1] / "frontend"):
+        if (folder / "templates").is_dir():
+            return folder
+    raise GalleyError("this installation of Galley holds no frontend; install it again")

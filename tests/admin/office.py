@@ -18,13 +18,13 @@ from galley.records import Store, VisitRow
 from galley.records.researchers import Researchers
 from galley.server.admin.pages import researcher_pages
 from galley.server.admin.passwords import Passwords
-from galley.server.app import Static, frontend_folder
+from galley.server.app import Static
 from galley.server.clock import Clock
 from galley.server.origin import SecureHeaders
 from galley.server.run import listen, server_config
 from galley.server.settings import Settings
 from galley.study.study import Study
-from galley.workspace import Workspace
+from galley.workspace import Workspace, frontend_folder
 from tests.admin.pilot import Pilot
 from tests.server.helpers import wait_until
 

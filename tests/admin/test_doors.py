@@ -16,10 +16,11 @@ from tests.admin.office import HOSTILE, NAME, PASSWORD, Office, csrf, log_in
 def every_route(office: Office) -> list[tuple[str, str]]:
     """(method, path) of every route under /researcher, with something that is there in each place."""
     visit = office.visits["done"].id
-    values = {"study": office.study.name, "visit": visit, "round": office.open_round, "kind": "csv"}
+    values = {"study": office.study.name, "visit": visit, "round": office.open_round, "kind": ""}
     found = []
     for route in office.pages.routes:
         assert isinstance(route, Route)
+        values["kind"] = "gif" if "/film." in route.path else "csv"
         path = re.sub(r"\{([^}]+)\}", lambda name: str(values[name[1].split(":")[0]]), route.path)
         found += [(method, path) for method in sorted(route.methods or ()) if method != "HEAD"]
     return found

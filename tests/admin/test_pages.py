@@ -13,6 +13,7 @@ import pytest
 
 from galley.kitchen.trajectory import from_text
 from galley.records import overview
+from galley.server.admin import tallies
 from galley.server.admin.downloads import DOWNLOADS
 from galley.server.admin.exporting import write_export
 from galley.server.admin.visits import LONGEST_NOTE
@@ -41,7 +42,15 @@ def test_live_numbers_are_those_of_the_page(office: Office) -> None:
     researcher = office.researcher()
     page = researcher.page("/studies/short")
     parts = researcher.data("/studies/short/live.json")["parts"]
-    assert set(parts) == {"numbers", "stages", "cells", "rounds", "flags"}
+    assert set(parts) == {
+        "numbers",
+        "stages",
+        "cells",
+        "rounds",
+        "flags",
+        "arrivals",
+        "arrivals_table",
+    }
     for name, html in parts.items():
         assert f'data-part="{name}"' in page
         assert html.strip() in page
@@ -247,3 +256,75 @@ def test_a_download_that_fails_says_why(office: Office, monkeypatch: pytest.Monk
     answer = office.researcher().http.get("/researcher/studies/short/download/csv")
     assert answer.status_code == 500
     assert "No file was made" in answer.text
+
+
+def finished_round(office: Office) -> int:
+    found = office.store.open_round(office.visits["done"].id, "rounds-1").result()
+    assert found is not None
+    return found.id
+
+
+@pytest.mark.parametrize(
+    ("ending", "media", "magic"), [("gif", "image/gif", b"GIF89a"), ("mp4", "video/mp4", b"ftyp")]
+)
+def test_a_round_is_downloaded_as_a_film(office: Office, ending: str, media: str, magic: bytes) -> None:
+    researcher, round_id = office.researcher(), finished_round(office)
+    path = f"/rounds/{round_id}/film.{ending}"
+    assert f'href="/researcher{path}"' in researcher.page(f"/rounds/{round_id}")
+    answer = researcher.http.get(f"/researcher{path}", timeout=120)
+    assert answer.status_code == 200, answer.text
+    assert answer.headers["content-type"] == media
+    assert answer.headers["content-disposition"] == f'attachment; filename="short-round-{round_id}.{ending}"'
+    assert magic in answer.content[:12]
+
+
+def test_films_are_not_offered_where_none_can_be_made(
+    office: Office, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    researcher, round_id = office.researcher(), finished_round(office)
+    assert "/film." not in researcher.page(f"/rounds/{office.open_round}")
+    researcher.page(f"/rounds/{round_id}/film.exe", 404)
+    researcher.page("/rounds/99999999999999999999/film.gif", 404)
+    monkeypatch.setattr("galley.film.write.NEEDED", ("no_such_library",))
+    assert "/film." not in researcher.page(f"/rounds/{round_id}")
+    researcher.page(f"/rounds/{round_id}/film.gif", 404)
+
+
+def test_flags_are_counted_as_the_list_shows_them(fresh: Office) -> None:
+    pilot = Pilot(fresh.store, fresh.workspace, fresh.study, START_MS - 3_600_000)
+    for test in (False, True, True):
+        pilot.walk(pilot.begin(test=test), hidden_s=90)
+    researcher = fresh.researcher()
+    flagged = re.findall(
+        r'<span class="flag flag-(\w+)">[^<]*</span></td><td class="n">(\d+)<',
+        researcher.page("/studies/short"),
+    )
+    listed = re.findall(r'<span class="flag flag-(\w+)"', researcher.page("/studies/short/visits?flagged=1"))
+    assert ("hidden_tab", "1") in flagged
+    assert sum(int(count) for _, count in flagged) == len(listed)
+
+
+def test_arrivals_are_counted_by_when_they_began() -> None:
+    hour = 3_600_000
+    start = 1_790_000_000_000 // hour * hour
+    began = [(start + 5, "completed"), (start + hour - 1, "active"), (start + 30 * hour, "timed_out")]
+    found = tallies.arrivals(began)
+    assert (found["span"], len(found["rows"])) == ("an hour", 31)
+    kept = [
+        (row["from_ms"], row["came"], row["done"], row["here"], row["gone"])
+        for row in found["rows"]
+        if row["came"]
+    ]
+    assert kept == [(start, 2, 1, 1, 0), (start + 30 * hour, 1, 0, 0, 1)]
+    assert tallies.arrivals(began[:2])["span"] == "10 minutes"
+    long_after = (start + 40_000 * 24 * hour, "active")
+    years = tallies.arrivals([*began, long_after])
+    assert (years["span"], sum(row["came"] for row in years["rows"])) == ("364 days", 4)
+    assert tallies.arrivals([])["rows"] == []
+
+
+def test_arrivals_are_shown_as_a_chart_and_a_table_without_tests(office: Office) -> None:
+    parts = office.researcher().data("/studies/short/live.json")["parts"]
+    assert len(re.findall(r'<rect class="(?:done|here|gone)" x=', parts["arrivals"])) >= 2
+    counts = re.findall(r'<td class="n">(\d+)</td>', parts["arrivals_table"])
+    assert sum(map(int, counts[::4])) == 4

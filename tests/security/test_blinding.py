@@ -11,11 +11,10 @@ import pytest
 from sqlalchemy import select
 
 from galley.records.tables import SEATS
-from galley.server.app import frontend_folder
 from galley.simulate.simulation import Simulation, simulate
 from galley.study.plan import plan_visit, visit_seed
 from galley.study.study import load_study
-from galley.workspace import Workspace
+from galley.workspace import Workspace, frontend_folder
 from tests.security.blinding import AGENTS, blind_workspace
 from tests.security.recording import recorded
 from tests.server.helpers import serving

@@ -11,17 +11,18 @@ import typer
 
 from galley.commands.options import DatabaseOption, JsonOption, WorkspaceOption
 
-app = typer.Typer(help="Recorded games: import, verify, measure.", no_args_is_help=True)
+app = typer.Typer(help="Recorded games: import, verify, measure, draw.", no_args_is_help=True)
 
 
 @app.command("import")
 def import_files(
     files: Annotated[
-        list[Path], typer.Argument(metavar="FILE...", help="Pickles of human games, or .csv of the LSI user study.")
+        list[Path],
+        typer.Argument(metavar="FILE...", help="Pickles of human games, or .csv of the LSI user study."),
     ],
     json_: JsonOption = False,
 ) -> None:
-    """Replay recorded human games and compare: every transition of pickles, the recorded figures of .csv files."""
+    """Replay recorded human games and compare: every transition of pickles, the figures of .csv files."""
     studies = [file for file in files if file.suffix.lower() == ".csv"]
     pickles = [file for file in files if file not in studies]
     if studies:
@@ -95,3 +96,39 @@ def measure(
         trajectory = read(file)
         figures = {"file": str(file), **asdict(measures(trajectory))}
         typer.echo(json.dumps(figures) if json_ else " ".join(f"{k}={v}" for k, v in figures.items()))
+
+
+@app.command()
+def draw(
+    out: Annotated[Path, typer.Option(metavar="FILE", help="Film to write: .gif or .mp4.")],
+    source: Annotated[
+        Path | None, typer.Argument(metavar="[SOURCE]", help="Trajectory file (JSON Lines).")
+    ] = None,
+    round_: Annotated[
+        int | None, typer.Option("--round", metavar="ID", help="Number of a round in the records instead.")
+    ] = None,
+    scale: Annotated[int, typer.Option(help="Edge of a tile in pixels.")] = 48,
+    speed: Annotated[float, typer.Option(help="Times as fast as it was played.")] = 1.0,
+    workspace: WorkspaceOption = Path(),
+    database: DatabaseOption = None,
+) -> None:
+    """Draw a round as participants saw it, as GIF or MP4. Needs the extra `video`."""
+    from galley.errors import GalleyError
+    from galley.film.footage import footage
+    from galley.film.write import check, write_film
+    from galley.kitchen.trajectory import read
+    from galley.workspace import Workspace, frontend_folder
+
+    if (source is None) == (round_ is None):
+        raise GalleyError("draw one round: name a trajectory file, or a round of the records with --round ID")
+    check(out, scale, speed)
+    if source is not None:
+        filmed = footage([read(source)], str(source))
+    else:
+        from galley.records.films import footage_of_round
+        from galley.records.store import Store
+
+        with Store.open(database or Workspace(workspace).database, must_exist=True) as store:
+            filmed = footage_of_round(store, round_ or 0)
+    count = write_film(filmed, frontend_folder() / "sprites", out, scale, speed)
+    typer.echo(f"{out}: {count} pictures of {filmed.ticks} ticks")

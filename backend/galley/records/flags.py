@@ -35,9 +35,13 @@ class Flag:
     words: str
 
 
-def flags(connection: Connection, study: str, visit_id: int | None = None) -> dict[int, tuple[Flag, ...]]:
-    """The flags of every visit of a study that has any, or of one visit."""
+def flags(
+    connection: Connection, study: str, visit_id: int | None = None, *, tests: bool = True
+) -> dict[int, tuple[Flag, ...]]:
+    """The flags of every visit of a study that has any, or of one visit; `tests` says whether of tests."""
     these = (VISITS.c.study == study) if visit_id is None else (VISITS.c.id == visit_id)
+    if not tests:
+        these = these & ~VISITS.c.test
     found: dict[int, list[Flag]] = defaultdict(list)
     for rule in (_late, _hidden, _failed, _slow):
         for visit, flag in rule(connection, these):

@@ -27,6 +27,7 @@ __all__ = [
     "TimelineEntry",
     "VisitSummary",
     "answers",
+    "began",
     "cells",
     "current_rounds",
     "flags",
@@ -223,6 +224,14 @@ def _steps(connection: Connection, study: str, wanted: Iterable[str]) -> list[tu
         missing -= places.keys()
     found = sorted((places[step][0], step) for step in wanted)
     return [(step, *places[step][1:]) for _, step in found]
+
+
+def began(connection: Connection, study: str) -> tuple[tuple[int, str], ...]:
+    """When each visit began (ms since 1970) and its status now, in that order, tests left out."""
+    query = select(VISITS.c.created_ms, VISITS.c.status).where(VISITS.c.study == study, ~VISITS.c.test)
+    return tuple(
+        (row.created_ms, row.status) for row in connection.execute(query.order_by(VISITS.c.created_ms))
+    )
 
 
 def cells(connection: Connection, study: str) -> tuple[CellCount, ...]:

@@ -7,7 +7,6 @@ import gc
 import logging
 from collections.abc import AsyncIterator, Iterator, Mapping
 from contextlib import asynccontextmanager
-from pathlib import Path
 from typing import Any
 
 from fastapi import FastAPI, Request
@@ -36,7 +35,7 @@ from galley.study.assignment import cells
 from galley.study.plan import plan_visit, visit_seed
 from galley.study.study import Study, load_study
 from galley.translations import Catalogues, mark
-from galley.workspace import Workspace
+from galley.workspace import Workspace, frontend_folder
 
 LOG = logging.getLogger(__name__)
 STATIC_KEPT_S = 300
@@ -149,18 +148,6 @@ class Static(StaticFiles):
         response = await super().get_response(path, scope)
         response.headers["cache-control"] = f"public, max-age={STATIC_KEPT_S}"
         return response
-
-
-def frontend_folder() -> Path:
-    """Where templates, styles, scripts and sprites are: in the installed package, or in a checkout.
-
-    Raises: GalleyError when this installation has none.
-    """
-    package = Path(__file__).resolve().parents[1]
-    for folder in (package / "_frontend", package.parents[1] / "frontend"):
-        if (folder / "templates").is_dir():
-            return folder
-    raise GalleyError("this installation of Galley holds no frontend; install it again")
 
 
 def _studies(workspace: Workspace, only: str) -> Mapping[str, Study]:

@@ -11,14 +11,17 @@ import tempfile
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 from fastapi import Request
 from fastapi.responses import FileResponse, Response
 from starlette.background import BackgroundTask
 
+from galley.errors import GalleyError
+from galley.film.write import can_draw
 from galley.records import queries
 from galley.records.rows import SessionRow
-from galley.server.admin.desk import Desk
+from galley.server.admin.desk import Desk, number
 
 AT_ONCE = 1
 
@@ -53,6 +56,10 @@ DOWNLOADS = {
 }
 
 
+FILMS = {"gif": "image/gif", "mp4": "video/mp4"}
+"""Films of one round, by their ending, with their media types."""
+
+
 class DownloadPages:
     """The files that a researcher can take home."""
 
@@ -66,33 +73,53 @@ class DownloadPages:
         download = DOWNLOADS.get(kind)
         if download is None or study not in await self._desk.read(queries.studies):
             return self._desk.missing(session, "download; nobody has visited this study yet")
+        tests = bool(request.query_params.get("tests"))
+        job = {"study": study, "kind": kind, "tests": tests}
+        return await self._made(session, job, f"{study}-{_stamp()}.{download.ending}", download.media)
+
+    async def film(self, request: Request, session: SessionRow) -> Response:
+        """One round as a film, made now."""
+        round_id, ending = number(request, "round"), request.path_params["kind"]
+        try:
+            row = await self._desk.read(lambda connection: queries.round_row(connection, round_id))
+        except GalleyError:
+            return self._desk.missing(session, "round")
+        if ending not in FILMS or not can_draw():
+            return self._desk.missing(session, "film: this server makes none")
+        name = f"{row.study}-round-{round_id}.{ending}"
+        return await self._made(session, {"round": round_id}, name, FILMS[ending])
+
+    async def _made(self, session: SessionRow, job: dict[str, Any], name: str, media: str) -> Response:
+        """The file that a process of its own makes of `job`, or a page that says why there is none."""
         folder = Path(await asyncio.to_thread(tempfile.mkdtemp, prefix="galley-export-"))
         try:
-            out = folder / f"out.{download.ending}"
-            tests = bool(request.query_params.get("tests"))
+            out = folder / f"out{Path(name).suffix}"
+            job |= {"database": self._desk.database, "out": str(out)}
             async with self._turns:
-                problem = await asyncio.to_thread(_in_a_process, self._desk.database, study, kind, tests, out)
+                problem = await asyncio.to_thread(_in_a_process, job)
         except BaseException:
             await asyncio.to_thread(shutil.rmtree, folder, ignore_errors=True)
             raise
         if problem:
             await asyncio.to_thread(shutil.rmtree, folder, ignore_errors=True)
             return self._desk.gate.plain(session, 500, "No file was made", problem)
-        stamp = f"{datetime.now(UTC):%Y%m%d-%H%M%S}"
         return FileResponse(
             out,
-            media_type=download.media,
-            filename=f"{study}-{stamp}.{download.ending}",
+            media_type=media,
+            filename=name,
             headers={"cache-control": "no-store"},
             background=BackgroundTask(shutil.rmtree, folder, ignore_errors=True),
         )
 
 
-def _in_a_process(database: str, study: str, kind: str, tests: bool, out: Path) -> str:
+def _stamp() -> str:
+    return f"{datetime.now(UTC):%Y%m%d-%H%M%S}"
+
+
+def _in_a_process(job: dict[str, Any]) -> str:
     """Empty once the file is written, else what went wrong. The database's URL travels on standard input:
     command lines are for everybody on the machine to read.
     """
-    job = {"database": database, "study": study, "kind": kind, "tests": tests, "out": str(out)}
     command = [sys.executable, "-m", "galley.server.admin.exporting"]
     done = subprocess.run(command, input=json.dumps(job), capture_output=True, text=True, check=False)  # noqa: S603
     if done.returncode == 0:

@@ -1,7 +1,8 @@
 """Writes one export in a process of its own, so that no running round waits for it.
 
-Run as a module: reads one JSON object from standard input (`database`, `study`, `kind`, `tests`, `out`),
-writes the file `out`, and exits with 1 after one line on standard error when that cannot be done.
+Run as a module: reads one JSON object from standard input (`database`, `out`, and either `study`, `kind` and
+`tests`, or `round` for a film of it), writes the file `out`, and exits with 1 after one line on standard
+error when that cannot be done.
 """
 
 from __future__ import annotations
@@ -13,9 +14,12 @@ import zipfile
 from pathlib import Path
 
 from galley.errors import GalleyError
+from galley.film.write import write_film
 from galley.records import Store
 from galley.records.export import export_study
+from galley.records.films import footage_of_round
 from galley.records.trajectories import export_human_data, export_trajectories
+from galley.workspace import frontend_folder
 
 TABLES = ("csv", "jsonl", "parquet")
 
@@ -36,6 +40,16 @@ def write_export(database: str, study: str, kind: str, tests: bool, out: Path) -
             export_human_data(store, study, out, include_test=tests)
 
 
+def write_round_film(database: str, round_id: int, out: Path) -> None:
+    """Write a round as a film to the file `out`, a .gif or .mp4.
+
+    Raises: GalleyError when there is no such round, or the extra `video` is missing.
+    """
+    with Store.open(database, must_exist=True) as store:
+        filmed = footage_of_round(store, round_id)
+    write_film(filmed, frontend_folder() / "sprites", out)
+
+
 def _zipped(folder: Path, out: Path) -> None:
     with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
         for file in sorted(folder.iterdir()):
@@ -46,7 +60,10 @@ def main() -> None:
     """Do what standard input asks for."""
     job = json.loads(sys.stdin.read())
     try:
-        write_export(job["database"], job["study"], job["kind"], job["tests"], Path(job["out"]))
+        if "round" in job:
+            write_round_film(job["database"], job["round"], Path(job["out"]))
+        else:
+            write_export(job["database"], job["study"], job["kind"], job["tests"], Path(job["out"]))
     except (GalleyError, OSError) as error:
         sys.stderr.write(f"{error}\n")
         sys.exit(1)

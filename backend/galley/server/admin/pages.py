@@ -45,6 +45,7 @@ def researcher_pages(
         "/studies/{study}/download/{kind}": files.download,
         "/visits/{visit:int}": about_visits.visit,
         "/rounds/{round:int}": about_rounds.round,
+        "/rounds/{round:int}/film.{kind}": files.film,
     }
     data = {
         "/live.json": about_studies.home_live,

@@ -9,10 +9,12 @@ from fastapi import Request
 from fastapi.responses import JSONResponse, Response
 
 from galley.errors import GalleyError
+from galley.film.write import can_draw
 from galley.records import overview, queries
 from galley.records.rows import RoundRow, SessionRow
 from galley.records.tables import TICKS
 from galley.server.admin.desk import Desk, number
+from galley.server.admin.downloads import FILMS
 from galley.server.admin.gate import NEVER_CACHED
 from galley.server.admin.replaying import replay_document
 
@@ -38,8 +40,10 @@ class RoundPages:
             row, visits = await self._desk.read(read)
         except GalleyError:
             return self._desk.missing(session, "round")
+        live = row.status == "open"
+        films = tuple(FILMS) if len(row.joint_actions) and not live and can_draw() else ()
         return self._desk.show(
-            session, "round.html", row=row, visits=visits, seats=row.seats, live=row.status == "open"
+            session, "round.html", row=row, visits=visits, seats=row.seats, live=live, films=films
         )
 
     async def replay(self, request: Request, session: SessionRow) -> Response:

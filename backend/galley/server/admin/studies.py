@@ -14,7 +14,7 @@ from galley.records.tables import STUDY_STATES, VISIT_STATUSES
 from galley.server.admin.desk import Desk, link
 from galley.server.admin.downloads import DOWNLOADS
 from galley.server.admin.gate import HOME, NEVER_CACHED, Form, first
-from galley.server.admin.tallies import cell_rows, flag_tallies, study_rows
+from galley.server.admin.tallies import arrivals, cell_rows, flag_tallies, study_rows
 from galley.study.assignment import capacity
 
 VISITS_A_PAGE = 50
@@ -68,7 +68,7 @@ class StudyPages:
             return JSONResponse({"error": "no such study"}, 404, NEVER_CACHED)
         parts = {
             part: self._desk.part(session, f"_{part}.html", name=name, **state)
-            for part in ("numbers", "stages", "cells", "rounds", "flags")
+            for part in ("numbers", "stages", "cells", "rounds", "flags", "arrivals", "arrivals_table")
         }
         return JSONResponse({"parts": parts}, 200, NEVER_CACHED)
 
@@ -81,7 +81,8 @@ class StudyPages:
                 "stages": overview.stages(connection, name) if here else (),
                 "cells": overview.cells(connection, name) if here else (),
                 "rounds": overview.current_rounds(connection, name) if here else (),
-                "flags": flag_tallies(overview.flags(connection, name) if here else {}),
+                "flags": flag_tallies(overview.flags(connection, name, tests=False) if here else {}),
+                "arrivals": arrivals(overview.began(connection, name)),
             }
 
         state = await self._desk.read(read)

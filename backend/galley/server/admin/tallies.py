@@ -2,12 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from galley.study.assignment import cells
 from galley.study.study import Study
 
+MINUTE_MS = 60_000
+HOUR_MS = 60 * MINUTE_MS
+DAY_MS = 24 * HOUR_MS
+SPANS = {
+    10 * MINUTE_MS: "10 minutes",
+    HOUR_MS: "an hour",
+    6 * HOUR_MS: "6 hours",
+    DAY_MS: "a day",
+    7 * DAY_MS: "7 days",
+    28 * DAY_MS: "28 days",
+    364 * DAY_MS: "364 days",
+}
+MOST_SPANS = 48
 UNDER_WAY = "active"
 DONE = "completed"
 
@@ -76,3 +89,24 @@ def flag_tallies(flags: Mapping[int, Iterable[Any]]) -> list[dict[str, Any]]:
     return [
         {"kind": kind, "visits": count} for kind, count in sorted(kinds.items(), key=lambda pair: -pair[1])
     ]
+
+
+def arrivals(began: Sequence[tuple[int, str]]) -> dict[str, Any]:
+    """How many visits began in each stretch of time from the first to the last, and what became of them.
+
+    `began` are times (ms) and statuses in order. `rows` are stretches of equal length, `span` in words: the
+    shortest of SPANS that needs no more than MOST_SPANS of them, counted from 1970-01-01 00:00 UTC.
+    """
+    if not began:
+        return {"span": "", "rows": []}
+    first, last = began[0][0], began[-1][0]
+    span = next((ms for ms in SPANS if last // ms - first // ms < MOST_SPANS), max(SPANS))
+    starts = range(first // span * span, last + 1, span)
+    rows = [{"from_ms": start, "to_ms": start + span, "done": 0, "here": 0, "gone": 0} for start in starts]
+    for at_ms, status in began:
+        kind = "done" if status == DONE else "here" if status == UNDER_WAY else "gone"
+        rows[at_ms // span - first // span][kind] += 1
+    return {
+        "span": SPANS[span],
+        "rows": [row | {"came": row["done"] + row["here"] + row["gone"]} for row in rows],
+    }
