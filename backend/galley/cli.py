@@ -11,6 +11,7 @@ from galley import __version__
 from galley.commands import (
     agents,
     check,
+    erase,
     evaluate,
     export,
     init,
@@ -34,6 +35,7 @@ app.command()(serve.serve)
 app.command()(check.check)
 app.command()(init.init)
 app.command()(export.export)
+app.command()(erase.erase)
 app.command()(evaluate.evaluate)
 app.command()(simulate.simulate)
 app.add_typer(trajectories.app, name="trajectories")

@@ -1,4 +1,4 @@
-"""`galley export`: a study's records as CSV."""
+"""`galley export`: a study's records as tables and trajectories."""
 
 from __future__ import annotations
 
@@ -12,19 +12,46 @@ from galley.commands.options import DatabaseOption, WorkspaceOption
 
 def export(
     study: Annotated[str, typer.Argument(help="Name of the study.")],
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder to write the CSV files to.")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder to write the files to.")],
+    formats: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--format",
+            metavar="FORMAT",
+            help="csv, jsonl or parquet; may be given several times.",
+            show_default="csv",
+        ),
+    ] = None,
+    trajectories: Annotated[
+        bool, typer.Option("--trajectories", help="Also write trajectories.zip: every episode, to replay.")
+    ] = False,
+    human_data: Annotated[
+        bool,
+        typer.Option(
+            "--human-data",
+            help="Also write human-data.csv: every tick in the field's public schema of human games.",
+        ),
+    ] = False,
+    tests: Annotated[bool, typer.Option("--tests", help="Include visits made to try the study out.")] = False,
     workspace: WorkspaceOption = Path(),
     database: DatabaseOption = None,
 ) -> None:
     """Write participants, rounds, ticks, responses and events as CSV, with their data dictionary."""
     from galley.records.export import export_study
     from galley.records.store import Store
+    from galley.records.trajectories import export_human_data, export_trajectories
     from galley.workspace import Workspace
 
-    store = Store.open(database or Workspace(workspace).database, must_exist=True)
-    try:
-        rows = export_study(store, study, out)
-    finally:
-        store.close()
-    for file, count in rows.items():
-        typer.echo(f"{out / file}: {count} rows")
+    with Store.open(database or Workspace(workspace).database, must_exist=True) as store:
+        written = {
+            out / file: f"{rows} rows"
+            for file, rows in export_study(store, study, out, formats or ("csv",), tests).items()
+        }
+        if trajectories:
+            file = out / "trajectories.zip"
+            written[file] = f"{export_trajectories(store, study, file, tests)} episodes"
+        if human_data:
+            file = out / "human-data.csv"
+            written[file] = f"{export_human_data(store, study, file, tests)} rows"
+    for file, count in written.items():
+        typer.echo(f"{file}: {count}")
