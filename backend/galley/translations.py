@@ -63,7 +63,7 @@ class Catalogues:
 
     @classmethod
     def load(cls, folder: Path = FOLDER) -> Catalogues:
-        """The catalogues `<language>/LC_MESSAGES/galley.po` below a folder; messages marked fuzzy are left out."""
+        """All `<language>/LC_MESSAGES/galley.po` below a folder; messages marked fuzzy are left out."""
         files = sorted(folder.glob(f"*/LC_MESSAGES/{DOMAIN}.po"))
         return cls(Translator(file.parts[-3].replace("_", "-"), _read(file)) for file in files)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from playwright.sync_api import Browser, Page
+from playwright.sync_api import Browser, Page, expect
 
 from galley.records import TickRow
 from tests.admin.office import NAME, PASSWORD, Office, open_office
@@ -89,7 +89,7 @@ def test_space_plays_to_the_end_and_stops_there(page: Page, office: Office) -> N
 def test_every_tick_is_in_the_table_and_the_scrubber_leads_anywhere(page: Page, office: Office) -> None:
     open_replay(page, office, finished_round(office))
     page.locator("details.data summary").press("Enter")
-    assert page.locator("[data-part=table] tbody tr").count() == 40
+    expect(page.locator("[data-part=table] tbody tr")).to_have_count(40)
     page.locator("[data-part=scrubber]").fill("23")
     assert tick(page) == 23
     assert page.locator("[data-part=lanes] rect").count() > 10
