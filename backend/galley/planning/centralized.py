@@ -20,14 +20,14 @@ BEYOND = 3
 """Orders after those whose likely cost counts, so that a plan leaves the kitchen prepared."""
 WIDTH = 64
 """Nodes kept per tick in the search for a plan that nobody waits for."""
-WIDTH_SMALL = 512
+WIDTH_SMALL = 100
 """The same in a kitchen of at most `SMALL` floor cells."""
 SMALL = 12
 WIDTH_PLAYING = 24
 """The same for an agent's first plan and after one has been carried out."""
 WIDTH_AFRESH = 3
 """The same when the world has deviated from the plan, which may happen every tick."""
-PAIRS_SMALL = 60
+PAIRS_SMALL = 30
 PAIRS = 16
 """Pairs of subtasks tried from each node."""
 MOST_TICKS = 300

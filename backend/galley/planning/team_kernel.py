@@ -39,7 +39,7 @@ from galley.kitchen.codes import (
 )
 from galley.kitchen.rules import finished, step
 from galley.planning.compiling import kernel
-from galley.planning.joint_kernel import FAR, FREE, joint_cost, joint_step, step_with_way
+from galley.planning.joint_kernel import FAR, FREE, MOST_POSES, joint_cost, joint_step, step_with_way
 from galley.planning.myopic_kernel import _open_order, _room, _wanted
 from galley.planning.robot_kernel import Brain, _alone, _cooks_for, _pose, _task_of, world_of
 from galley.planning.subtask_kernel import (
@@ -314,19 +314,25 @@ def pair_to_go(
 
 @kernel
 def walk(
-    brain: Brain, state: NDArray[int16], cell0: int, cell1: int, wait0: bool, wait1: bool, first: int,
-    leg: NDArray[uint8], out: NDArray[int32],
+    brain: Brain, state: NDArray[int16], cell0: int, cell1: int, wait0: bool, wait1: bool, end0: int, end1: int,
+    first: int, leg: NDArray[uint8], out: NDArray[int32],
 ) -> int:  # fmt: skip
     """How many ticks until a chef has interacted at its tile, 0 if none does; `state` and `leg` are filled.
 
+    A chef ends in the pose `end0` or `end1` (4 * floor + facing), -1: in any that faces its tile.
     `first` 2: both tiles are reached soonest; 0 or 1: that chef's is, the other comes as near as it can.
     """
     goal0 = FREE if wait0 else 1 + cell0
     goal1 = FREE if wait1 else 1 + cell1
+    cells = brain.joint.floor_of.size
+    if end0 >= 0:
+        goal0 = 1 + cells + end0
+    if end1 >= 0:
+        goal1 = 1 + cells + end1
     useful = ~(1 << BIT_BLOCKED)
     for tick in range(LEG_TICKS):
-        at0 = not wait0 and _alone(brain, state, 0, cell0) == 0
-        at1 = not wait1 and _alone(brain, state, 1, cell1) == 0
+        at0 = not wait0 and _alone(brain, state, 0, cell0) == 0 and end0 in (-1, _pose(brain, state, 0))
+        at1 = not wait1 and _alone(brain, state, 1, cell1) == 0 and end1 in (-1, _pose(brain, state, 1))
         does0 = at0 and not _must_wait(brain, state, 0, cell0)
         does1 = at1 and not _must_wait(brain, state, 1, cell1)
         pose0, pose1 = _pose(brain, state, 0), _pose(brain, state, 1)
@@ -462,29 +468,39 @@ def search_plan(
             order = np.argsort(rated[:found])
             for index in range(min(pairs, found)):
                 pick = which[order[index]]
-                for first in range(3):
-                    if first < 2 and (pick[0] == WAIT or pick[2] == WAIT):
-                        continue
-                    state[:] = now
-                    length = walk(
-                        brain, state, pick[1], pick[3], pick[0] == WAIT, pick[2] == WAIT, 2 - first, leg, out
-                    )
-                    then = tick + length
-                    if length == 0 or then >= ticks:
-                        continue
-                    if _met_before(search, _key(state), then):
-                        continue
-                    still = max(0, orders - (state[DELIVERIES] - served))
-                    total = float(then)
-                    if still + beyond > 0:
-                        total += to_go(brain, state, still, beyond, thorough, ahead, summed)
-                    new = _place(search, then, total)
-                    if new >= 0:
-                        search.states[new] = state
-                        search.parents[new] = node
-                        search.legs[new, :length] = leg[:length]
-                        search.lengths[new] = length
-                        search.totals[new] = total
+                wait0 = pick[0] == WAIT
+                wait1 = pick[2] == WAIT
+                most0 = MOST_POSES if thorough and not wait0 else 0
+                most1 = MOST_POSES if thorough and not wait1 else 0
+                for which0 in range(-1, most0):
+                    end0 = -1 if which0 < 0 else brain.joint.ends[1 + pick[1], which0]
+                    if which0 >= 0 and end0 < 0:
+                        break
+                    for which1 in range(-1, most1):
+                        end1 = -1 if which1 < 0 else brain.joint.ends[1 + pick[3], which1]
+                        if which1 >= 0 and end1 < 0:
+                            break
+                        for first in range(2, -1, -1):
+                            if first < 2 and (wait0 or wait1):
+                                continue
+                            state[:] = now
+                            length = walk(
+                                brain, state, pick[1], pick[3], wait0, wait1, end0, end1, first, leg, out
+                            )
+                            then = tick + length
+                            if length == 0 or then >= ticks or _met_before(search, _key(state), then):
+                                continue
+                            still = max(0, orders - (state[DELIVERIES] - served))
+                            total = float(then)
+                            if still + beyond > 0:
+                                total += to_go(brain, state, still, beyond, thorough, ahead, summed)
+                            new = _place(search, then, total)
+                            if new >= 0:
+                                search.states[new] = state
+                                search.parents[new] = node
+                                search.legs[new, :length] = leg[:length]
+                                search.lengths[new] = length
+                                search.totals[new] = total
     if best_end >= 0:
         return best_end, True
     return best_node, False
