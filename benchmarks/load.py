@@ -10,7 +10,7 @@ deadlines in a process of its own: what is late there, the machine is late with.
     python benchmarks/load.py --curve 10,50,100,200,300,400,500,600 --markdown
 
 Source of the network: Carroll et al. 2019 (NeurIPS), App. C: three convolutions of 25 filters (5x5, 3x3, 3x3,
-the last without padding), three dense layers of 32, leaky ReLU.
+the last without padding), three dense layers, here of 64 as in the COLE paper (App. C), leaky ReLU.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ SIZES = {
     "counter_circuit": (8, 5),
 }
 """Width and height of the layouts played."""
-CHANNELS, FILTERS, DENSE, ACTIONS = 26, 25, 32, 6
+CHANNELS, FILTERS, DENSE, ACTIONS = 26, 25, 64, 6
 LEAK = 0.2
 BAR_P99_MS = 25.0
 CONTROL_P99_MS = 5.0
