@@ -1,4 +1,4 @@
-"""How fast the planners are on one core, beside the overcooked-ai 1.1.0 planner in the same run, and what they score.
+"""How fast the planners are on one core, beside those of overcooked-ai 1.1.0 in the same run; their scores.
 
     python benchmarks/planning.py          one line a figure
     python benchmarks/planning.py --json   one JSON object a figure: name, value, unit, command
@@ -30,6 +30,7 @@ from galley.planning.joint_motion import JointMotion  # noqa: E402
 from galley.planning.robots import QMDP  # noqa: E402
 from tests.planning.package import package_planner  # noqa: E402
 
+COMMAND = "python benchmarks/planning.py"
 OPEN = Layout.from_ascii(
     "open kitchen",
     """
@@ -79,9 +80,11 @@ def trials_s() -> float:
 
 
 def decisions_ms(ticks: int = 3000) -> np.ndarray:
-    """Processor milliseconds of each QMDP decision (observe and act) beside a myopic human, the first ones too."""
+    """Processor milliseconds of each QMDP decision (observe and act) beside a myopic human."""
     layout = OPEN.with_rules(horizon_ticks=ticks, orders=None)
-    human = play_trials(layout, Team(orders=(), trials=1, horizon_ticks=ticks))[0].joint_actions[:, 1].tolist()
+    human = (
+        play_trials(layout, Team(orders=(), trials=1, horizon_ticks=ticks))[0].joint_actions[:, 1].tolist()
+    )
     robot = QMDP()
     robot.reset(layout, 0, 0)
     kitchen = Kitchen(layout)
@@ -146,7 +149,12 @@ def main() -> None:
     for source in sources:
         for name, value, unit, bar in source():
             if options.json:
-                figure = {"name": name, "value": value, "unit": unit, "command": "python benchmarks/planning.py"}
+                figure = {
+                    "name": name,
+                    "value": value,
+                    "unit": unit,
+                    "command": "python benchmarks/planning.py",
+                }
                 print(json.dumps(figure), flush=True)
             else:
                 print(f"{name:60} {value:10.4g} {unit:7} {bar}", flush=True)

@@ -1,10 +1,10 @@
-"""How far the measures of a kitchen hold when the simulated human errs: the harness of Table I of the LSI paper.
+"""How far the measures of a kitchen hold when the human errs: the harness of Table I of the LSI paper.
 
     python benchmarks/robustness.py          a table
     python benchmarks/robustness.py --json   one JSON object a figure: name, value, unit, command
 
-On 60 seeded random kitchens a QMDP robot and a myopic human cook 50 trials of 100 ticks (two onion orders). The
-medians of each measure without noise place the kitchens; then everything is run again with other seeds at
+On 60 seeded random kitchens a QMDP robot and a myopic human cook 50 trials of 100 ticks (two onion orders).
+The medians of each measure without noise place the kitchens; then everything is run again with other seeds at
 each epsilon. A figure is Spearman's rank correlation of both, its 95% interval from 2,000 bootstrap samples
 of kitchens, and its p value times the 25 tests (Bonferroni).
 
@@ -29,7 +29,13 @@ from galley.analysis.evaluate import Team, evaluate  # noqa: E402
 
 KITCHENS = 60
 EPSILONS = (0.0, 0.05, 0.1, 0.2, 0.5)
-MEASURES = ("ingredients_difference", "dishes_difference", "served_difference", "concurrent_share", "stuck_ticks")
+MEASURES = (
+    "ingredients_difference",
+    "dishes_difference",
+    "served_difference",
+    "concurrent_share",
+    "stuck_ticks",
+)
 SAMPLES = 2000
 
 
@@ -72,8 +78,9 @@ def main() -> None:
             row += f"{f'{value:.2f} [{low:.2f}, {high:.2f}] p {p:.1g}':>36}"
             if as_json:
                 figure = {
-                    "name": f"rho {name} epsilon {epsilon}", "value": round(value, 4), "unit": "Spearman's rho",
-                    "low": round(float(low), 4), "high": round(float(high), 4), "p": p, "command": command,
+                    "name": f"rho {name} epsilon {epsilon}", "value": round(value, 4),
+                    "unit": "Spearman's rho", "low": round(float(low), 4), "high": round(float(high), 4),
+                    "p": p, "command": command,
                 }  # fmt: skip
                 print(json.dumps(figure))
         if not as_json:

@@ -29,13 +29,14 @@ def row(trajectory: Trajectory) -> dict[str, str]:
     found = measures(trajectory)
     names = ("num_ingre_held", "num_plate_held", "num_served")
     loads = [
-        dict(zip(names, (found.ingredients[s], found.dishes[s], found.served[s]), strict=True)) for s in (0, 1)
+        dict(zip(names, (found.ingredients[s], found.dishes[s], found.served[s]), strict=True))
+        for s in (0, 1)
     ]
     words = [*STEPS, (0, 0), "interact"]
     actions = [(words[one], words[other]) for one, other in trajectory.joint_actions.tolist()]
     told = (
-        trajectory.layout.name, str(loads), str(found.ticks), str(found.concurrent_ticks), str(found.stuck_ticks),
-        str(actions), "\n".join(GRID) + "\n",
+        trajectory.layout.name, str(loads), str(found.ticks), str(found.concurrent_ticks),
+        str(found.stuck_ticks), str(actions), "\n".join(GRID) + "\n",
     )  # fmt: skip
     return dict(zip(COLUMNS, told, strict=True))
 

@@ -35,7 +35,7 @@ def random_kitchen(seed: int, most_floor: int = 8, stations: str = "POODS") -> L
 
 
 class Enumeration:
-    """All joint poses of a kitchen and where each of the 25 joint moves takes them, by the rules' own kernel."""
+    """All joint poses of a kitchen and where each of the 25 joint moves takes them, by the rules."""
 
     def __init__(self, layout: Layout) -> None:
         cells = [layout.cell(place) for place in layout.floor]
@@ -97,7 +97,7 @@ def furnished_kitchen(seed: int) -> Layout:
 
 
 def fewest_ticks(layout: Layout, most_states: int = 3_000_000) -> int | None:
-    """The fewest ticks until the order list is served, by search of every state; None beyond `most_states`."""
+    """The fewest ticks until the order list is served, by search of every state; None if it never is."""
     joint = np.array(list(np.ndindex(6, 6)), dtype=np.uint8)
     frontier = start(layout)[None]
     seen = np.empty(0, dtype=np.uint64)

@@ -20,9 +20,9 @@ FACINGS = {(0, -1): 0, (0, 1): 1, (1, 0): 2, (-1, 0): 3}
 
 @dataclass(frozen=True)
 class Pair:
-    """A pair of starts and goals: ticks until the first chef is there (first) and both are (both), None if never.
+    """A pair of starts and goals: ticks until the first chef is there and until both are, None if never.
 
-    The package's figure for both may be None of a plan: it does not look for collisions after the first is done.
+    The package's figure for both is of no plan: it does not look for collisions after the first is done.
     """
 
     start: tuple[Pose, Pose]

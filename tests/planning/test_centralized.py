@@ -38,7 +38,7 @@ APART = Layout.from_ascii(
 
 
 def gap(seed: int) -> float | None:
-    """How far the plan's ticks are above the fewest possible; None where the order cannot be served at all."""
+    """How far the plan's ticks are above the fewest possible; None where the order cannot be served."""
     layout = furnished_kitchen(seed)
     best = fewest_ticks(layout)
     if best is None:

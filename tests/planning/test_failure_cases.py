@@ -1,4 +1,4 @@
-"""Kitchens in which not knowing the human's subtask costs an order: the failure cases of Fig. 7 of the LSI paper."""
+"""Kitchens in which not knowing the human's subtask costs an order: Fig. 7 of the LSI paper."""
 
 from __future__ import annotations
 

@@ -20,8 +20,8 @@ def check(name: str) -> None:
     for pair in pairs:
         assert pair.ours_first is not None, pair
         assert pair.ours_first <= pair.theirs_first, pair
-        # Its figure for both ends is of no plan: it stops looking for collisions when the first is done. Where
-        # it is below ours (which equals enumeration) only the chef that is done can be in the other's way.
+        # Its figure for both is of no plan: it stops looking for collisions when the first is done. Where it
+        # is below ours (which equals enumeration) the chef that is done stands in the other's way.
         if pair.ours_both is not None and pair.theirs_both < pair.ours_both:
             assert pair.theirs_first < pair.theirs_both, pair
 

@@ -83,7 +83,7 @@ def play_trials(layout: Layout, team: Team) -> list[Trajectory]:
         raise GalleyError("epsilon must be from 0 to 1, and there must be at least one trial")
     kitchen = kitchen_of(layout, team)
     require_solvable(distances(kitchen))
-    seeds = np.random.SeedSequence(team.seed).generate_state(team.trials, np.uint64)
+    seeds = np.random.SeedSequence(team.seed).generate_state(team.trials, np.uint64).astype(np.uint64)
     if team.robot in ROBOTS and team.human == "myopic":
         found = run(kitchen, team.robot, team.epsilon, seeds, team.robot_seat)
         pairs = zip(found.joint_actions, found.ticks.tolist(), strict=True)
@@ -98,9 +98,7 @@ def play_trials(layout: Layout, team: Team) -> list[Trajectory]:
     ]
 
 
-def _play(
-    layout: Layout, agents: list[Agent], human: int, epsilon: float, seed: int
-) -> NDArray[np.uint8]:
+def _play(layout: Layout, agents: list[Agent], human: int, epsilon: float, seed: int) -> NDArray[np.uint8]:
     """uint8[T, 2]: the joint actions of one trial, the agents asked tick by tick."""
     kitchen = Kitchen(layout)
     for seat, agent in enumerate(agents):

@@ -49,7 +49,7 @@ def figures(trial: Measures, robot_seat: int = 0) -> dict[str, float]:
 def spreads(trials: Sequence[dict[str, float]]) -> dict[str, Spread]:
     """The spread of each figure over the trials.
 
-    Source: Fontaine et al. 2021 (RSS), App. D-D: medians, since performance is rank-based and robust to outliers.
+    Source: Fontaine et al. 2021 (RSS), App. D-D: medians, as performance is rank-based.
     """
     found = {}
     for name in trials[0]:

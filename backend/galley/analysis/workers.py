@@ -36,7 +36,9 @@ def evaluate_many(
     try:
         from distributed import Client, LocalCluster, as_completed
     except ImportError:
-        raise GalleyError("several workers need Dask; install it with: pip install 'galley[evaluate]'") from None
+        raise GalleyError(
+            "several workers need Dask; install it with: pip install 'galley[evaluate]'"
+        ) from None
     cluster = None
     if scheduler is None:
         cluster = LocalCluster(
@@ -45,7 +47,9 @@ def evaluate_many(
     try:
         client = Client(cluster if cluster is not None else scheduler, timeout="10s")
     except (OSError, ValueError) as error:
-        raise GalleyError(f"the scheduler {scheduler} does not answer ({error}); start it with: dask scheduler") from None
+        raise GalleyError(
+            f"the scheduler {scheduler} does not answer ({error}); start it with: dask scheduler"
+        ) from None
     try:
         futures = client.map(_from_dict, [layout.to_dict() for layout in layouts], team=team, pure=False)
         for number, _ in enumerate(as_completed(futures), start=1):

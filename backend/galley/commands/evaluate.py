@@ -24,7 +24,8 @@ def evaluate(
     orders: Annotated[
         str | None,
         typer.Option(
-            help="Order list such as onion,tomato; none for no list.", show_default="the layout's, else onion,onion"
+            help="Order list such as onion,tomato; none for no list.",
+            show_default="the layout's, else onion,onion",
         ),
     ] = None,
     seat: Annotated[int, typer.Option(min=0, max=1, help="Seat of the robot.")] = 0,
@@ -55,7 +56,9 @@ def evaluate(
             kitchens.append(load_layout(Path(name)))
         else:
             kitchens.append(find_layout(home, name))
-    with typer.progressbar(length=len(kitchens), label="layouts", file=typer.get_text_stream("stderr")) as bar:
+    with typer.progressbar(
+        length=len(kitchens), label="layouts", file=typer.get_text_stream("stderr")
+    ) as bar:
         answers = evaluate_many(kitchens, team, workers, scheduler, lambda done: bar.update(1))
     for answer in answers:
         if json_:
@@ -64,6 +67,7 @@ def evaluate(
         typer.echo(f"{answer['layout']}: {robot} and {human}, {trials} trials of {horizon} ticks")
         for name, spread in answer["measures"].items():
             typer.echo(
-                f"  {name:24} {spread['median']:8.3f}   quartiles {spread['lower']:.3f} to {spread['upper']:.3f}"
+                f"  {name:24} {spread['median']:8.3f}"
+                f"   quartiles {spread['lower']:.3f} to {spread['upper']:.3f}"
                 f"   all {spread['least']:.3f} to {spread['most']:.3f}"
             )

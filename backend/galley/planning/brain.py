@@ -73,9 +73,12 @@ def brain(layout: Layout, seat: int, team: bool = False) -> Brain:
     pots = int((known.reachable.any(axis=0) & (layout.tiles.ravel() == POT)).sum())
     robot_takes, human_takes = durations(known, seat), durations(known, 1 - seat)
     needed = [
-        (AT_POT, TAKE_INGREDIENT), (AT_POT, TAKE_A_DISH), (WITH_INGREDIENT, FILL_POT), (WITH_DISH, FETCH_SOUP),
+        (AT_POT, TAKE_INGREDIENT),
+        (AT_POT, TAKE_A_DISH),
+        (WITH_INGREDIENT, FILL_POT),
+        (WITH_DISH, FETCH_SOUP),
         (WITH_SOUP, SERVE),
-    ]  # fmt: skip
+    ]
     _add_cooking(layout.rules.cook_time_ticks, pots, robot_takes, human_takes)
     passes = any(takes[one] >= UNABLE for takes in (robot_takes, human_takes) for one in needed)
     longest = max(takes[takes < UNABLE].max(initial=1.0) for takes in (robot_takes, human_takes))

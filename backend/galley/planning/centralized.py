@@ -66,9 +66,9 @@ class TeamPlanner:
         width: int | None = None,
         most_ticks: int = MOST_TICKS,
     ) -> TeamPlan:
-        """The plan from `state` (int16[S]) until `orders` more soups are served, at most those of the order list.
+        """The plan from `state` (int16[S]) until `orders` more soups are served (else `ORDERS_AHEAD`).
 
-        Without `orders`: until the list is served, or `ORDERS_AHEAD` orders where there is no list.
+        No more than what is left of an order list; the orders after them count by their likely cost.
 
         Raises:
             GalleyError: less than one order or tick is asked for.

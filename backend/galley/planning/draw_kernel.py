@@ -19,7 +19,7 @@ def _mixed(word: uint64) -> uint64:
 
 
 @kernel
-def draw(seed: int, seat: int, tick: int, stream: int) -> float:
+def draw(seed: int | uint64, seat: int, tick: int, stream: int) -> float:
     """What `galley.randomness.uniform` gives for the same four numbers, bit for bit."""
     word = _mixed(uint64(seed) + _STEP)
     word = _mixed((word ^ uint64(seat)) + _STEP)

@@ -78,10 +78,10 @@ def _before(joint: JointTables, poses: NDArray[int16], state: int, bumps: bool, 
 
 @kernel
 def _faces_floor(joint: JointTables, poses: NDArray[int16], count: int) -> bool:
+    found = False
     for index in range(count):
-        if joint.ahead[poses[index] // 4, poses[index] % 4] >= 0:
-            return True
-    return False
+        found = found or joint.ahead[poses[index] // 4, poses[index] % 4] >= 0
+    return found
 
 
 @kernel
@@ -156,7 +156,7 @@ def _fill(joint: JointTables, goal0: int, goal1: int, table: NDArray[int16]) -> 
 
 @kernel
 def table_of(joint: JointTables, goal0: int, goal1: int) -> int:
-    """The slot of the table for a pair of goals, filled now if need be; the oldest gives way when all are used."""
+    """The slot of the table for a pair of goals, filled now if need be in place of the oldest."""
     slot = joint.slot[goal0, goal1]
     if slot >= 0:
         return int(slot)
@@ -176,7 +176,7 @@ def table_of(joint: JointTables, goal0: int, goal1: int) -> int:
 
 @kernel
 def _settled(joint: JointTables, goal: int, pose: int) -> int:
-    """The state of a chef that has settled at `pose`, or that of its cell if that pose does not end its goal."""
+    """The state of a chef that has settled at `pose`, or of its cell if `pose` does not end its goal."""
     for index in range(MOST_POSES):
         if joint.ends[goal, index] == pose:
             return joint.cell_of.size + index
@@ -242,7 +242,7 @@ def _alone(joint: JointTables, costs: NDArray[int16], goal: int, pose: int) -> i
 def joint_step(
     joint: JointTables, costs: NDArray[int16], goal0: int, goal1: int, pose0: int, pose1: int, first: int
 ) -> int:
-    """8 * action of seat 0 + action of seat 1: the first tick of a joint plan; stay for both if there is none.
+    """8 * action of seat 0 + action of seat 1: the first tick of a joint plan; both stay if there is none.
 
     Among plans of fewest ticks: the chef of seat `first` as near its goal as can be, then the other,
     then the fewest moves, then the first in the order of action codes. `costs` are those of `distances`.
@@ -274,7 +274,7 @@ def joint_step(
 def step_with_way(
     joint: JointTables, costs: NDArray[int16], goal0: int, goal1: int, first: int, pose0: int, pose1: int
 ) -> int:
-    """As `joint_step`, but the chef of seat `first` gets to its goal soonest; of equals the best for both goals."""
+    """As `joint_step`, but the chef of seat `first` has the right of way: its goal is reached soonest."""
     best = STAY * 8 + STAY
     one, other = (goal0, FREE) if first == 0 else (FREE, goal1)
     slot = table_of(joint, one, other)

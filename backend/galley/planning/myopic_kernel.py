@@ -69,7 +69,7 @@ def _dispenser_of(thing: int) -> int:
 
 
 @kernel
-def _reaches(spec: NDArray[int16], reach: NDArray[bool_], seat: int, tile: int) -> bool:
+def reaches_tile(spec: NDArray[int16], reach: NDArray[bool_], seat: int, tile: int) -> bool:
     """Whether a seat can face some tile of this code."""
     tiles = spec[SPEC_TILES : SPEC_TILES + reach.shape[1]]
     return bool(np.any(reach[seat] & (tiles == tile)))
@@ -86,7 +86,7 @@ def _lying(state: NDArray[int16], spec: NDArray[int16], reach: NDArray[bool_], s
 
 
 @kernel
-def _open_order(spec: NDArray[int16], state: NDArray[int16], ahead: int) -> int:
+def open_order(spec: NDArray[int16], state: NDArray[int16], ahead: int) -> int:
     """The ingredient of the order `ahead` places behind the first open one; NOTHING beyond the list's end."""
     place = state[ORDERS_DELIVERED] + ahead
     if place >= spec[SPEC_ORDERS]:
@@ -95,10 +95,12 @@ def _open_order(spec: NDArray[int16], state: NDArray[int16], ahead: int) -> int:
 
 
 @kernel
-def _wanted(spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_]) -> int:
+def wanted_kind(spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_]) -> int:
     """The ingredient of the next soup to begin: that of the first open order that no soup answers yet."""
     if spec[SPEC_ORDERS] == 0:
-        onions = _reaches(spec, reach, 0, ONION_DISPENSER) or _reaches(spec, reach, 1, ONION_DISPENSER)
+        onions = reaches_tile(spec, reach, 0, ONION_DISPENSER) or reaches_tile(
+            spec, reach, 1, ONION_DISPENSER
+        )
         return ONION if onions else TOMATO
     soups = np.zeros(3, dtype=np.int16)
     for cell in range(reach.shape[1]):
@@ -112,16 +114,16 @@ def _wanted(spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_]) 
         if held > SOUP_OF_KIND:
             soups[held - SOUP_OF_KIND] += 1
     ahead = 0
-    kind = _open_order(spec, state, ahead)
+    kind = open_order(spec, state, ahead)
     while kind != NOTHING and soups[kind] > 0:
         soups[kind] -= 1
         ahead += 1
-        kind = _open_order(spec, state, ahead)
+        kind = open_order(spec, state, ahead)
     return kind
 
 
 @kernel
-def _room(packed: int, wanted: int, ingredient: int, any_order: bool) -> int:
+def pot_room(packed: int, wanted: int, ingredient: int, any_order: bool) -> int:
     """How many of an ingredient a pot can take, 0 if it should get none."""
     count = packed // POT_COUNT % POT_COUNT
     kind = packed % POT_COUNT
@@ -131,7 +133,7 @@ def _room(packed: int, wanted: int, ingredient: int, any_order: bool) -> int:
 
 
 @kernel
-def _need(
+def need_of(
     spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], seat: int, thing: int, wanted: int,
     not_for: int,
 ) -> int:  # fmt: skip
@@ -144,24 +146,24 @@ def _need(
         if thing == DISH:
             need += packed // POT_COUNT % POT_COUNT == INGREDIENTS_PER_SOUP
         else:
-            need += _room(packed, wanted, thing, False)
+            need += pot_room(packed, wanted, thing, False)
     return need
 
 
 @kernel
-def _to_pass(
+def must_pass(
     spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], seat: int, thing: int, wanted: int
 ) -> bool:
     """Whether the other chef needs a thing that only this one can get, beyond what it holds or finds."""
     other = 1 - seat
-    need = _need(spec, state, reach, other, thing, wanted, seat)
-    if need == 0 or _reaches(spec, reach, other, _dispenser_of(thing)):
+    need = need_of(spec, state, reach, other, thing, wanted, seat)
+    if need == 0 or reaches_tile(spec, reach, other, _dispenser_of(thing)):
         return False
     return bool(need > _lying(state, spec, reach, other, thing) + (state[CHEF * other + HELD] == thing))
 
 
 @kernel
-def _free_counter(
+def free_counter(
     spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], costs: NDArray[int16], seat: int,
     shared: bool,
 ) -> int:  # fmt: skip
@@ -205,12 +207,12 @@ def _nearest(spec: NDArray[int16], costs: NDArray[int16], tile: int) -> int:
 
 
 @kernel
-def _drop(
+def drop_at(
     spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], costs: NDArray[int16], seat: int
 ) -> int:
     """Where to put a thing of no use: the nearest empty counter, an unshared one if chefs are apart."""
-    apart = _free_counter(spec, state, reach, costs, seat, False)
-    shared = _free_counter(spec, state, reach, costs, seat, True)
+    apart = free_counter(spec, state, reach, costs, seat, False)
+    shared = free_counter(spec, state, reach, costs, seat, True)
     if apart == NOWHERE or shared == NOWHERE:
         return max(apart, shared)
     if _together(reach) and costs[shared] < costs[apart]:
@@ -231,37 +233,37 @@ def _empty_handed(
 ) -> int:  # fmt: skip
     """Where a chef who holds nothing should interact."""
     other = 1 - seat
-    serves = _reaches(spec, reach, seat, SERVING)
+    serves = reaches_tile(spec, reach, seat, SERVING)
     for kind in (ONION, TOMATO):
-        ordered = spec[SPEC_ORDERS] == 0 or _open_order(spec, state, 0) == kind
-        if ordered and (serves or _reaches(spec, reach, other, SERVING)):
+        ordered = spec[SPEC_ORDERS] == 0 or open_order(spec, state, 0) == kind
+        if ordered and (serves or reaches_tile(spec, reach, other, SERVING)):
             soup = _source(spec, state, reach, costs, seat, kind + SOUP_OF_KIND, not serves)
             if soup != NOWHERE:
                 return soup
-    room = _free_counter(spec, state, reach, costs, seat, True) != NOWHERE
+    room = free_counter(spec, state, reach, costs, seat, True) != NOWHERE
     on_its_way = state[CHEF * other + HELD] == DISH
-    if _need(spec, state, reach, seat, DISH, wanted, -1) > on_its_way:
+    if need_of(spec, state, reach, seat, DISH, wanted, -1) > on_its_way:
         dish = _source(spec, state, reach, costs, seat, DISH, False)
         if dish != NOWHERE:
             return dish
-    if room and _to_pass(spec, state, reach, seat, DISH, wanted):
+    if room and must_pass(spec, state, reach, seat, DISH, wanted):
         dish = _source(spec, state, reach, costs, seat, DISH, True)
         if dish != NOWHERE:
             return dish
     best = NOWHERE
     for kind in (ONION, TOMATO):
-        own = _need(spec, state, reach, seat, kind, wanted, -1) > 0
-        if own or (room and _to_pass(spec, state, reach, seat, kind, wanted)):
+        own = need_of(spec, state, reach, seat, kind, wanted, -1) > 0
+        if own or (room and must_pass(spec, state, reach, seat, kind, wanted)):
             found = _source(spec, state, reach, costs, seat, kind, not own)
             if found != NOWHERE and (best == NOWHERE or costs[found] < costs[best]):
                 best = found
     if best != NOWHERE or room or _together(reach):
         return best
     # Nothing to do, and no shared counter free to get what is missing: clear one of the other's things away.
-    if _free_counter(spec, state, reach, costs, seat, False) == NOWHERE:
+    if free_counter(spec, state, reach, costs, seat, False) == NOWHERE:
         return NOWHERE
     for thing in (ONION, TOMATO, DISH):
-        if not _reaches(spec, reach, seat, _dispenser_of(thing)):
+        if not reaches_tile(spec, reach, seat, _dispenser_of(thing)):
             found = _source(spec, state, reach, costs, seat, thing, False)
             if found != NOWHERE and reach[other, found]:
                 return found
@@ -279,14 +281,14 @@ def _holding_ingredient(
     for cell in range(costs.size):
         if costs[cell] < 0 or _tile(spec, cell) != POT:
             continue
-        room = _room(state[CELLS + cell], wanted, held, spec[SPEC_ORDERS] == 0)
+        room = pot_room(state[CELLS + cell], wanted, held, spec[SPEC_ORDERS] == 0)
         if room > 0 and (best == NOWHERE or costs[cell] < costs[best]):
             best = cell
     if best != NOWHERE:
         return best
-    if _to_pass(spec, state, reach, seat, held, wanted):
-        return _free_counter(spec, state, reach, costs, seat, True)
-    return _drop(spec, state, reach, costs, seat)
+    if must_pass(spec, state, reach, seat, held, wanted):
+        return free_counter(spec, state, reach, costs, seat, True)
+    return drop_at(spec, state, reach, costs, seat)
 
 
 @kernel
@@ -307,9 +309,9 @@ def _holding_dish(
                 best, soonest = cell, soon
     if best != NOWHERE:
         return best
-    if _to_pass(spec, state, reach, seat, DISH, wanted):
-        return _free_counter(spec, state, reach, costs, seat, True)
-    return _drop(spec, state, reach, costs, seat)
+    if must_pass(spec, state, reach, seat, DISH, wanted):
+        return free_counter(spec, state, reach, costs, seat, True)
+    return drop_at(spec, state, reach, costs, seat)
 
 
 @kernel
@@ -318,14 +320,14 @@ def _holding_soup(
 ) -> int:
     """Where a chef who holds a soup should interact; a soup that is ordered later is put down until then."""
     kind = state[CHEF * seat + HELD] - SOUP_OF_KIND
-    if spec[SPEC_ORDERS] > 0 and _open_order(spec, state, 0) != kind:
+    if spec[SPEC_ORDERS] > 0 and open_order(spec, state, 0) != kind:
         for ahead in range(1, spec[SPEC_ORDERS]):
-            if _open_order(spec, state, ahead) == kind:
-                return _drop(spec, state, reach, costs, seat)
+            if open_order(spec, state, ahead) == kind:
+                return drop_at(spec, state, reach, costs, seat)
     serving = _nearest(spec, costs, SERVING)
-    if serving != NOWHERE or not _reaches(spec, reach, 1 - seat, SERVING):
+    if serving != NOWHERE or not reaches_tile(spec, reach, 1 - seat, SERVING):
         return serving
-    return _free_counter(spec, state, reach, costs, seat, True)
+    return free_counter(spec, state, reach, costs, seat, True)
 
 
 @kernel
@@ -336,7 +338,7 @@ def target(
     chef = CHEF * seat
     costs = all_costs[state[chef + CELL] * 4 + state[chef + FACING]]
     held = state[chef + HELD]
-    wanted = _wanted(spec, state, reach)
+    wanted = wanted_kind(spec, state, reach)
     if held == NOTHING:
         return _empty_handed(spec, state, reach, costs, seat, wanted)
     if held == DISH:
@@ -398,7 +400,7 @@ def _in_the_way(spec: NDArray[int16], state: NDArray[int16], seat: int, memory: 
 
 
 @kernel
-def _wander(spec: NDArray[int16], state: NDArray[int16], seat: int, back: int, draw: float) -> int:
+def wander(spec: NDArray[int16], state: NDArray[int16], seat: int, back: int, draw: float) -> int:
     """A random move to a free cell, `back` only if there is no other; NOWHERE if there is none."""
     cell = state[CHEF * seat + CELL]
     other = state[CHEF * (1 - seat) + CELL]
@@ -439,7 +441,7 @@ def decide(
                 back = memory[OWN_ACTION] ^ 1  # the codes of opposite moves differ in the last bit
     elif not _in_the_way(spec, state, seat, memory):
         return action
-    move = _wander(spec, state, seat, back, draw)
+    move = wander(spec, state, seat, back, draw)
     return action if move == NOWHERE else move
 
 

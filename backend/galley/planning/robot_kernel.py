@@ -16,7 +16,6 @@ from galley.kitchen.codes import (
     CELL,
     CELLS,
     CHEF,
-    DELIVERIES,
     FACING,
     HELD,
     INGREDIENTS_PER_SOUP,
@@ -38,7 +37,7 @@ from galley.kitchen.codes import (
 from galley.kitchen.rules import step
 from galley.planning.compiling import kernel
 from galley.planning.joint_kernel import FAR, FREE, JointTables, joint_cost, joint_step
-from galley.planning.myopic_kernel import _wander, target
+from galley.planning.myopic_kernel import target, wander
 from galley.planning.subtask_kernel import (
     DELIVER,
     DROP,
@@ -55,7 +54,6 @@ from galley.planning.subtask_kernel import (
 )
 from galley.planning.value_kernel import (
     AT_POT,
-    AT_SERVING,
     FETCH_SOUP,
     FILL_POT,
     IDLE,
@@ -85,7 +83,7 @@ ROBOT_MEMORY = 8
 CROWDED_TICKS = 4
 """Added to both ways when no joint plan ends both, for instance two chefs bound for one narrow spot."""
 WAIT_TICKS = 3.0
-"""Added to the cost of waiting, or a robot in a crowd would put its work off for ever: the values know no crowd."""
+"""Added to the cost of waiting: the values know no crowd, where a robot would put its work off for ever."""
 LEAST = 0.1
 """The weight of an action that leads one tick away from a subtask, beside 1 + LEAST for one that changes
 nothing and 2 + LEAST for one that leads a tick towards it."""
@@ -108,7 +106,7 @@ class Brain(NamedTuple):
 
 
 @kernel
-def _task_of(kind: int) -> int:
+def task_of(kind: int) -> int:
     """The subtask of the value tables for a kind of subtask."""
     if kind in (TAKE_ONION, TAKE_TOMATO):
         return TAKE_INGREDIENT
@@ -151,20 +149,21 @@ def world_of(spec: NDArray[int16], state: NDArray[int16], lying_soup: bool) -> i
 
 
 @kernel
-def _pose(brain: Brain, state: NDArray[int16], seat: int) -> int:
+def pose_of(brain: Brain, state: NDArray[int16], seat: int) -> int:
+    """The pose of a chef: 4 * floor number + facing."""
     chef = CHEF * seat
     return int(4 * brain.joint.floor_of[state[chef + CELL]] + state[chef + FACING])
 
 
 @kernel
-def _alone(brain: Brain, state: NDArray[int16], seat: int, cell: int) -> int:
+def way_alone(brain: Brain, state: NDArray[int16], seat: int, cell: int) -> int:
     """The fewest actions of a chef to a tile, the other left out of account."""
     chef = CHEF * seat
     return int(brain.costs[4 * state[chef + CELL] + state[chef + FACING], cell])
 
 
 @kernel
-def _cooks_for(brain: Brain, state: NDArray[int16], cell: int) -> int:
+def cooks_for(brain: Brain, state: NDArray[int16], cell: int) -> int:
     """The ticks until the soup in a full pot is ready; 0 for anything else."""
     packed = state[CELLS + cell]
     if brain.spec[SPEC_TILES + cell] != POT or packed // POT_COUNT % POT_COUNT < INGREDIENTS_PER_SOUP:
@@ -177,7 +176,7 @@ def pair_cost(brain: Brain, state: NDArray[int16], seat: int, mine: int, others:
     """The ticks until both chefs face their tiles (-1: anywhere) by a joint plan; FAR if there is none."""
     goal = FREE if mine < 0 else 1 + mine
     other = FREE if others < 0 else 1 + others
-    pose0, pose1 = _pose(brain, state, 0), _pose(brain, state, 1)
+    pose0, pose1 = pose_of(brain, state, 0), pose_of(brain, state, 1)
     if seat == 0:
         return joint_cost(brain.joint, goal, other, pose0, pose1)
     return joint_cost(brain.joint, other, goal, pose0, pose1)
@@ -188,13 +187,13 @@ def _cost_to_go(
     brain: Brain, state: NDArray[int16], seat: int, kind: int, cell: int, human: int, human_cell: int
 ) -> float:
     """The expected ticks until the orders ahead are served if the robot takes up `kind` at `cell` now."""
-    human_task = _task_of(human)
+    human_task = task_of(human)
     human_left = IDLE_TICKS
     alone = 0
     if human_cell >= 0:
-        alone = _alone(brain, state, 1 - seat, human_cell)
-        human_left = float(max(alone, _cooks_for(brain, state, human_cell)) + 1)
-    own = 0 if cell < 0 else _alone(brain, state, seat, cell)
+        alone = way_alone(brain, state, 1 - seat, human_cell)
+        human_left = float(max(alone, cooks_for(brain, state, human_cell)) + 1)
+    own = 0 if cell < 0 else way_alone(brain, state, seat, cell)
     delay = 0
     if cell >= 0 or human_cell >= 0:
         together = pair_cost(brain, state, seat, cell, human_cell)
@@ -212,11 +211,11 @@ def _cost_to_go(
         return WAIT_TICKS + robot_waits(
             stand, human_task, human_left, at, pots, unit, brain.human_takes, brain.robot_next, False
         )
-    left = float(max(own, _cooks_for(brain, state, cell)) + 1)
+    left = float(max(own, cooks_for(brain, state, cell)) + 1)
     if alone <= own:
         left += delay
     return both_busy(
-        _task_of(kind), left, human_task, human_left, at, pots, unit, brain.robot_next, brain.human_next
+        task_of(kind), left, human_task, human_left, at, pots, unit, brain.robot_next, brain.human_next
     )
 
 
@@ -235,10 +234,10 @@ def likely(
     brain: Brain, state: NDArray[int16], seat: int, sees: bool, belief: NDArray[float64],
     weights: NDArray[float64], cells: NDArray[int64],
 ) -> int:  # fmt: skip
-    """The human's likeliest subtask; fills `weights` float64[KINDS] and `cells` int64[KINDS], the tile of each.
+    """The human's likeliest subtask; fills the weight (float64[KINDS]) and tile (int64[KINDS]) of each.
 
-    A robot that sees has one certain subtask: that of the myopic human in this state. Otherwise weights are the
-    belief over the feasible subtasks, uniform while there is none.
+    A robot that sees has one certain subtask: that of the myopic human in this state. Otherwise weights are
+    the belief over the feasible subtasks, uniform while there is none.
     """
     human = 1 - seat
     weights[:] = 0
@@ -276,7 +275,7 @@ def choose(
     brain: Brain, state: NDArray[int16], seat: int, weights: NDArray[float64], cells: NDArray[int64],
     values: NDArray[float64],
 ) -> tuple[int, int]:  # fmt: skip
-    """(kind, cell) of the robot's best subtask; `values` float64[KINDS] gets -Q of each feasible kind, else -inf."""
+    """(kind, cell) of the robot's best subtask; `values` float64[KINDS] are -Q, -inf if not feasible."""
     feasible = np.zeros((KINDS, 4), dtype=np.int16)
     subtasks(brain.spec, brain.costs, brain.reach, state, seat, feasible)
     values[:] = -np.inf
@@ -303,13 +302,13 @@ def _toward(brain: Brain, state: NDArray[int16], seat: int, cell: int, human_cel
     mine, others = cell, human_cell
     if pair_cost(brain, state, seat, mine, others) >= FAR:
         # Both cannot be done at once: who is nearer goes first.
-        if _alone(brain, state, seat, cell) <= _alone(brain, state, 1 - seat, human_cell):
+        if way_alone(brain, state, seat, cell) <= way_alone(brain, state, 1 - seat, human_cell):
             others = -1
         else:
             mine = -1
     goal = FREE if mine < 0 else 1 + mine
     other = FREE if others < 0 else 1 + others
-    pose0, pose1 = _pose(brain, state, 0), _pose(brain, state, 1)
+    pose0, pose1 = pose_of(brain, state, 0), pose_of(brain, state, 1)
     if seat == 0:
         return joint_step(brain.joint, brain.costs, goal, other, pose0, pose1, 0) // 8
     return joint_step(brain.joint, brain.costs, other, goal, pose0, pose1, 1) % 8
@@ -326,8 +325,8 @@ def robot_action(
     values = np.empty(KINDS, dtype=np.float64)
     human = likely(brain, state, seat, sees, belief, weights, cells)
     kind, cell = choose(brain, state, seat, weights, cells, values)
-    at_work = cell >= 0 and _alone(brain, state, seat, cell) == 0
-    if at_work and not (kind == FETCH and _cooks_for(brain, state, cell) > 0):
+    at_work = cell >= 0 and way_alone(brain, state, seat, cell) == 0
+    if at_work and not (kind == FETCH and cooks_for(brain, state, cell) > 0):
         return INTERACT
     action = STAY
     if cell >= 0 or cells[human] >= 0:
@@ -335,7 +334,7 @@ def robot_action(
     if stuck(state, memory) or (
         memory[STILL] >= PATIENCE_TICKS and action == STAY and cell >= 0 and not at_work
     ):
-        move = _wander(brain.spec, state, seat, -1, draw)
+        move = wander(brain.spec, state, seat, -1, draw)
         return action if move < 0 else move
     return action
 
@@ -363,7 +362,7 @@ def robot_observe(
     brain: Brain, state: NDArray[int16], seat: int, memory: NDArray[int16], belief: NDArray[float64],
     action0: int, action1: int, after: NDArray[int16], out: NDArray[int32],
 ) -> None:  # fmt: skip
-    """Nothing; notes what both did in `state` and updates the belief; `after` int16[S] becomes the next state.
+    """Nothing; notes what both did in `state`, updates the belief; `after` int16[S] becomes the next state.
 
     The belief is uniform over the feasible subtasks when the human has done one. Otherwise each subtask's
     weight is multiplied by 1 + LEAST + the ticks by which the human's action shortened its way there.
@@ -399,8 +398,8 @@ def robot_observe(
             before = FAR
             now = FAR
             for index in range(feasible[kind, 0]):
-                before = min(before, _alone(brain, state, human, feasible[kind, 1 + index]))
-                now = min(now, _alone(brain, after, human, feasible[kind, 1 + index]))
+                before = min(before, way_alone(brain, state, human, feasible[kind, 1 + index]))
+                now = min(now, way_alone(brain, after, human, feasible[kind, 1 + index]))
             shorter = before - now
             if now == 0 and action >= STAY:
                 shorter = 1  # it waits where it should be

@@ -48,7 +48,8 @@ def require_solvable(known: Distances) -> None:
         if not (known.reachable & there).any():
             where = layout.place(int(there.argmax()))
             raise GalleyError(
-                f"layout {layout.name!r}: no chef can reach the {_NAMES[station]} at {where}; clear a way to it"
+                f"layout {layout.name!r}: no chef can reach the {_NAMES[station]} at {where}; "
+                "clear a way to it"
             )
     if (known.reachable.all(axis=0) & (tiles == COUNTER)).any():
         return
@@ -66,6 +67,6 @@ def require_solvable(known: Distances) -> None:
         if not any(pot.any() for pot in both):
             lacking = DISH_DISPENSER if not servers else POT
             raise GalleyError(
-                f"layout {layout.name!r}: the chefs stand apart and share no counter, so no chef can reach the "
-                f"{_NAMES[lacking]} with what it needs there; open a counter between them"
+                f"layout {layout.name!r}: the chefs stand apart and share no counter, so no chef can "
+                f"reach the {_NAMES[lacking]} with what it needs there; open a counter between them"
             )

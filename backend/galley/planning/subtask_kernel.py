@@ -33,14 +33,14 @@ from galley.kitchen.codes import (
 )
 from galley.planning.compiling import kernel
 from galley.planning.myopic_kernel import (
-    _drop,
-    _free_counter,
-    _need,
-    _open_order,
-    _reaches,
-    _room,
-    _to_pass,
-    _wanted,
+    drop_at,
+    free_counter,
+    must_pass,
+    need_of,
+    open_order,
+    pot_room,
+    reaches_tile,
+    wanted_kind,
 )
 
 WAIT = 0
@@ -58,7 +58,7 @@ NEAREST = 3
 
 
 @kernel
-def _add(out: NDArray[int16], kind: int, cell: int, costs: NDArray[int16]) -> None:
+def add_tile(out: NDArray[int16], kind: int, cell: int, costs: NDArray[int16]) -> None:
     """Nothing; `cell` becomes one of the nearest tiles of a subtask if it is."""
     if cell < 0 or costs[cell] < 0:
         return
@@ -76,7 +76,7 @@ def _add(out: NDArray[int16], kind: int, cell: int, costs: NDArray[int16]) -> No
 
 
 @kernel
-def _sources(
+def add_sources(
     spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], costs: NDArray[int16], seat: int,
     thing: int, unshared: bool, kind: int, out: NDArray[int16],
 ) -> None:  # fmt: skip
@@ -94,7 +94,7 @@ def _sources(
         tile = spec[SPEC_TILES + cell]
         lies = tile == COUNTER and state[CELLS + cell] == thing and not (unshared and reach[1 - seat, cell])
         if lies or tile == dispenser:
-            _add(out, kind, cell, costs)
+            add_tile(out, kind, cell, costs)
 
 
 @kernel
@@ -103,23 +103,23 @@ def _with_empty_hands(
     wanted: int, out: NDArray[int16],
 ) -> None:  # fmt: skip
     other = 1 - seat
-    serves = _reaches(spec, reach, seat, SERVING)
-    if serves or _reaches(spec, reach, other, SERVING):
+    serves = reaches_tile(spec, reach, seat, SERVING)
+    if serves or reaches_tile(spec, reach, other, SERVING):
         for kind in (ONION, TOMATO):
-            if spec[SPEC_ORDERS] == 0 or _open_order(spec, state, 0) == kind:
-                _sources(spec, state, reach, costs, seat, kind + SOUP_OF_KIND, not serves, TAKE_SOUP, out)
-    room = _free_counter(spec, state, reach, costs, seat, True) >= 0
+            if spec[SPEC_ORDERS] == 0 or open_order(spec, state, 0) == kind:
+                add_sources(spec, state, reach, costs, seat, kind + SOUP_OF_KIND, not serves, TAKE_SOUP, out)
+    room = free_counter(spec, state, reach, costs, seat, True) >= 0
     on_its_way = state[CHEF * other + HELD] == DISH
-    if _need(spec, state, reach, seat, DISH, wanted, -1) > on_its_way:
-        _sources(spec, state, reach, costs, seat, DISH, False, TAKE_DISH, out)
-    elif room and _to_pass(spec, state, reach, seat, DISH, wanted):
-        _sources(spec, state, reach, costs, seat, DISH, True, TAKE_DISH, out)
+    if need_of(spec, state, reach, seat, DISH, wanted, -1) > on_its_way:
+        add_sources(spec, state, reach, costs, seat, DISH, False, TAKE_DISH, out)
+    elif room and must_pass(spec, state, reach, seat, DISH, wanted):
+        add_sources(spec, state, reach, costs, seat, DISH, True, TAKE_DISH, out)
     for kind in (ONION, TOMATO):
         task = TAKE_ONION if kind == ONION else TAKE_TOMATO
-        if _need(spec, state, reach, seat, kind, wanted, -1) > 0:
-            _sources(spec, state, reach, costs, seat, kind, False, task, out)
-        elif room and _to_pass(spec, state, reach, seat, kind, wanted):
-            _sources(spec, state, reach, costs, seat, kind, True, task, out)
+        if need_of(spec, state, reach, seat, kind, wanted, -1) > 0:
+            add_sources(spec, state, reach, costs, seat, kind, False, task, out)
+        elif room and must_pass(spec, state, reach, seat, kind, wanted):
+            add_sources(spec, state, reach, costs, seat, kind, True, task, out)
 
 
 @kernel
@@ -127,7 +127,7 @@ def subtasks(
     spec: NDArray[int16], all_costs: NDArray[int16], reach: NDArray[bool_], state: NDArray[int16], seat: int,
     out: NDArray[int16],
 ) -> None:  # fmt: skip
-    """Nothing; fills `out` int16[KINDS, 4]: for each kind how many tiles, then up to 3 cells, the nearest first.
+    """Nothing; fills `out` int16[KINDS, 4]: for each kind how many tiles, then up to 3 cells, nearest first.
 
     A kind without tiles is not feasible; to wait always is and has none.
     """
@@ -135,7 +135,7 @@ def subtasks(
     chef = CHEF * seat
     costs = all_costs[state[chef + CELL] * 4 + state[chef + FACING]]
     held = state[chef + HELD]
-    wanted = _wanted(spec, state, reach)
+    wanted = wanted_kind(spec, state, reach)
     if held == NOTHING:
         _with_empty_hands(spec, state, reach, costs, seat, wanted, out)
         return
@@ -152,23 +152,23 @@ def subtasks(
         elif kind == FETCH:
             fits = tile == POT and packed // POT_COUNT % POT_COUNT == INGREDIENTS_PER_SOUP
         else:
-            fits = tile == POT and _room(packed, wanted, held, spec[SPEC_ORDERS] == 0) > 0
+            fits = tile == POT and pot_room(packed, wanted, held, spec[SPEC_ORDERS] == 0) > 0
         if fits:
-            _add(out, kind, cell, costs)
-    if kind == DELIVER and spec[SPEC_ORDERS] > 0 and _open_order(spec, state, 0) != held - SOUP_OF_KIND:
+            add_tile(out, kind, cell, costs)
+    if kind == DELIVER and spec[SPEC_ORDERS] > 0 and open_order(spec, state, 0) != held - SOUP_OF_KIND:
         for ahead in range(1, spec[SPEC_ORDERS]):
-            if _open_order(spec, state, ahead) == held - SOUP_OF_KIND:  # its turn comes later
+            if open_order(spec, state, ahead) == held - SOUP_OF_KIND:  # its turn comes later
                 out[DELIVER, 0] = 0
     if out[kind, 0] > 0:
         return
     if kind == DELIVER:
-        passes = _reaches(spec, reach, 1 - seat, SERVING) and not _reaches(spec, reach, seat, SERVING)
+        passes = reaches_tile(spec, reach, 1 - seat, SERVING) and not reaches_tile(spec, reach, seat, SERVING)
     else:
-        passes = _to_pass(spec, state, reach, seat, held, wanted)
+        passes = must_pass(spec, state, reach, seat, held, wanted)
     if passes:
-        _add(out, DROP, _free_counter(spec, state, reach, costs, seat, True), costs)
+        add_tile(out, DROP, free_counter(spec, state, reach, costs, seat, True), costs)
     else:
-        _add(out, DROP, _drop(spec, state, reach, costs, seat), costs)
+        add_tile(out, DROP, drop_at(spec, state, reach, costs, seat), costs)
 
 
 @kernel

@@ -36,11 +36,11 @@ SUBTASKS = (
     Subtask("deliver", "soup", "always, unless it is ordered only later"),
     Subtask("drop", "anything", "the thing is of no use in hand: on a shared counter if the other needs it"),
 )
-"""In the order of the kernels' codes. Source: Fontaine et al. 2021 (RSS), Fig. 9; passing and orders are ours."""
+"""In the order of the kernels' codes. Source: Fontaine et al. 2021 (RSS), Fig. 9; passing, orders: ours."""
 
 
 def feasible_subtasks(known: Distances, state: NDArray[np.int16], seat: int) -> dict[str, tuple[Place, ...]]:
-    """For each feasible subtask of a seat in a state (int16[S]), up to three tiles to do it at, nearest first.
+    """For each feasible subtask of a seat in a state (int16[S]), up to three tiles for it, nearest first.
 
     Waiting is left out unless nothing else can be done; it has no tile.
     """

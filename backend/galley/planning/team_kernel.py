@@ -1,7 +1,7 @@
 """The search for a plan that both chefs follow, compiled: A* over pairs of subtasks within a beam.
 
-Source: Fontaine et al. 2021 (RSS), Sec. IV "Centralized Planning", after Carroll et al. 2019. Ours: costs to go by
-value iteration as the heuristic, a beam per tick, plans in which one chef has the right of way.
+Source: Fontaine et al. 2021 (RSS), Sec. IV "Centralized Planning", after Carroll et al. 2019. Ours: costs
+to go by value iteration as the heuristic, a beam per tick, plans in which one chef has the right of way.
 """
 
 from __future__ import annotations
@@ -9,65 +9,33 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy import float32, int16, int32, int64, uint8, uint64
+from numpy import float32, float64, int16, int32, int64, uint8, uint64
 from numpy.typing import NDArray
 
 from galley.kitchen.codes import (
     BIT_BLOCKED,
-    CELL,
-    CELLS,
-    CHEF,
-    COUNTER,
     DELIVERIES,
-    DISH,
-    FACING,
-    HELD,
-    INGREDIENTS_PER_SOUP,
     INTERACT,
-    NOTHING,
-    ONION,
     OUT_EVENTS,
-    POT,
-    POT_COUNT,
-    SERVING,
-    SOUP_OF_KIND,
-    SPEC_ORDERS,
-    SPEC_TILES,
     STAY,
     TICK,
-    TOMATO,
 )
 from galley.kitchen.rules import finished, step
 from galley.planning.compiling import kernel
 from galley.planning.joint_kernel import FAR, FREE, MOST_POSES, joint_cost, joint_step, step_with_way
-from galley.planning.myopic_kernel import _open_order, _room, _wanted
-from galley.planning.robot_kernel import Brain, _alone, _cooks_for, _pose, _task_of, world_of
+from galley.planning.robot_kernel import Brain, pose_of, way_alone
 from galley.planning.subtask_kernel import (
-    DELIVER,
-    DROP,
-    FETCH,
-    FILL,
     KINDS,
-    TAKE_DISH,
-    TAKE_ONION,
-    TAKE_SOUP,
-    TAKE_TOMATO,
     WAIT,
-    _add,
-    _sources,
 )
-from galley.planning.value_kernel import MOST_ORDERS, both_busy
+from galley.planning.team_estimate_kernel import must_wait, pair_to_go, to_go
 
 LEG_TICKS = 96
 """The most ticks from one decision to the next interaction."""
-STRANDED_TICKS = 500.0
-"""The cost to go of a state in which neither chef has anything to do."""
 PROBES = 64
 """Places looked at for a state met before; beyond them it counts as new."""
 LATER_TICKS = 10
 """How much later a plan may end than the first one found if the kitchen is then better prepared."""
-STAGE_TICKS = 3.5
-"""What a step on a thing's way from dispenser to pot is taken to cost where things pass over counters."""
 
 
 class Search(NamedTuple):
@@ -84,238 +52,9 @@ class Search(NamedTuple):
 
 
 @kernel
-def _pass_counters(
-    brain: Brain, state: NDArray[int16], seat: int, out: NDArray[int16], summed: NDArray[int16]
-) -> None:
-    """Nothing; adds the empty counters that both reach with the least way for both together."""
-    chef = CHEF * seat
-    other = CHEF * (1 - seat)
-    own = brain.costs[4 * state[chef + CELL] + state[chef + FACING]]
-    theirs = brain.costs[4 * state[other + CELL] + state[other + FACING]]
-    for cell in range(own.size):
-        summed[cell] = -1
-        if own[cell] >= 0 and theirs[cell] >= 0:
-            summed[cell] = own[cell] + theirs[cell]
-            if brain.spec[SPEC_TILES + cell] == COUNTER and state[CELLS + cell] == NOTHING:
-                _add(out, DROP, cell, summed)
-
-
-@kernel
-def team_options(
-    brain: Brain, state: NDArray[int16], seat: int, orders: int, thorough: bool, out: NDArray[int16],
-    summed: NDArray[int16],
-) -> None:  # fmt: skip
-    """Nothing; fills `out` int16[KINDS, 4] as `subtasks` does, with all that can serve a plan for `orders` more soups.
-
-    A `thorough` search has more to try: dishes before a pot is begun, waiting beside a pot that is not full,
-    both chefs after the last ingredient. In a narrow beam these crowd out better plans.
-    """
-    out[:] = 0
-    spec, reach = brain.spec, brain.reach
-    chef = CHEF * seat
-    costs = brain.costs[4 * state[chef + CELL] + state[chef + FACING]]
-    held = state[chef + HELD]
-    others = state[CHEF * (1 - seat) + HELD]
-    wanted = _wanted(spec, state, reach)
-    any_order = spec[SPEC_ORDERS] == 0
-    soups = 0  # made or being made
-    begun = 0
-    dishes = int(others == DISH)
-    if others > SOUP_OF_KIND:
-        soups += 1
-    room = np.zeros(3, dtype=np.int64)
-    for cell in range(costs.size):
-        tile = spec[SPEC_TILES + cell]
-        packed = state[CELLS + cell]
-        if tile == POT:
-            count = packed // POT_COUNT % POT_COUNT
-            soups += count == INGREDIENTS_PER_SOUP
-            begun += count > 0
-            for kind in (ONION, TOMATO):
-                if count == INGREDIENTS_PER_SOUP:
-                    packed = 0  # the next soup's ingredients may be taken ahead
-                room[kind] += _room(packed, wanted, kind, any_order)
-        elif tile == COUNTER and packed > SOUP_OF_KIND:
-            soups += 1
-    if held == NOTHING:
-        for kind in (ONION, TOMATO):
-            if any_order or _open_order(spec, state, 0) == kind:
-                _sources(spec, state, reach, costs, seat, kind + SOUP_OF_KIND, False, TAKE_SOUP, out)
-        if (max(begun, 1) if thorough else begun) > dishes:
-            _sources(spec, state, reach, costs, seat, DISH, False, TAKE_DISH, out)
-        for kind in (ONION, TOMATO):
-            if room[kind] > (others == kind and not thorough) and soups < orders:
-                _sources(
-                    spec, state, reach, costs, seat, kind, False,
-                    TAKE_ONION if kind == ONION else TAKE_TOMATO, out,
-                )  # fmt: skip
-        return
-    for cell in range(costs.size):
-        tile = spec[SPEC_TILES + cell]
-        packed = state[CELLS + cell]
-        if held == DISH:
-            full = packed // POT_COUNT % POT_COUNT == INGREDIENTS_PER_SOUP
-            if tile == POT and (full or thorough):  # who is early waits beside it
-                _add(out, FETCH, cell, costs)
-        elif held > DISH:
-            if tile == SERVING and (any_order or _open_order(spec, state, 0) == held - SOUP_OF_KIND):
-                _add(out, DELIVER, cell, costs)
-        elif tile == POT:
-            if packed // POT_COUNT % POT_COUNT == INGREDIENTS_PER_SOUP:
-                packed = 0  # who is early waits beside it
-            if _room(packed, wanted, held, any_order) > 0:
-                _add(out, FILL, cell, costs)
-    _pass_counters(brain, state, seat, out, summed)
-    if out[DROP, 0] == 0:
-        for cell in range(costs.size):
-            if spec[SPEC_TILES + cell] == COUNTER and state[CELLS + cell] == NOTHING:
-                _add(out, DROP, cell, costs)
-
-
-@kernel
-def _left(brain: Brain, state: NDArray[int16], seat: int, cell: int) -> float:
-    """The ticks that a chef alone needs to do something useful with the tile at `cell`."""
-    wait = _cooks_for(brain, state, cell)
-    if _must_wait(brain, state, seat, cell):
-        wait += 1
-    return float(max(_alone(brain, state, seat, cell), wait) + 1)
-
-
-@kernel
-def _must_wait(brain: Brain, state: NDArray[int16], seat: int, cell: int) -> bool:
-    """Whether interacting with the tile does nothing yet: a soup still cooks, or a pot is still full."""
-    if brain.spec[SPEC_TILES + cell] != POT:
-        return False
-    full = state[CELLS + cell] // POT_COUNT % POT_COUNT == INGREDIENTS_PER_SOUP
-    if state[CHEF * seat + HELD] == DISH:
-        return not full or _cooks_for(brain, state, cell) > 0
-    return bool(full)
-
-
-@kernel
-def _stages(brain: Brain, state: NDArray[int16], orders: int) -> float:
-    """A cost to go where things pass over counters: the steps that are left on the way of each thing needed."""
-    spec = brain.spec
-    ingredients = 0
-    stages = 0.0
-    shared_ingredients = 0
-    shared_dishes = 0
-    soups = 0  # out of the pot
-    in_pots = 0
-    cooking = 0
-    inside = 0
-    for cell in range(brain.reach.shape[1]):
-        tile = spec[SPEC_TILES + cell]
-        packed = state[CELLS + cell]
-        if tile == POT:
-            count = packed // POT_COUNT % POT_COUNT
-            if count == INGREDIENTS_PER_SOUP:
-                in_pots += 1
-                cooking = max(cooking, _cooks_for(brain, state, cell))
-            else:
-                inside += count
-        elif tile == COUNTER and packed != NOTHING:
-            shared = brain.reach[0, cell] and brain.reach[1, cell]
-            if packed > SOUP_OF_KIND:
-                soups += 1
-                stages += 2
-            elif shared and packed == DISH:
-                shared_dishes += 1
-            elif shared:
-                shared_ingredients += 1
-    near = 0.0
-    hands_ingredients = 0.0
-    hands_dishes = 0.0
-    for seat in range(2):
-        held = state[CHEF * seat + HELD]
-        station = -1
-        if held > SOUP_OF_KIND:
-            soups += 1
-            stages += 1
-            station = SERVING
-        elif held != NOTHING:
-            station = POT
-        best = FAR
-        for cell in range(brain.reach.shape[1]):
-            if spec[SPEC_TILES + cell] == station:
-                cost = _alone(brain, state, seat, cell)
-                if cost >= 0:
-                    best = min(best, cost)
-        reaches = best < FAR
-        if held == DISH:
-            hands_dishes += 1 if reaches else 0.34
-        elif held == ONION or held == TOMATO:
-            hands_ingredients += 1 if reaches else 0.34
-        if reaches:
-            near += 0.05 * best
-    made = soups + in_pots
-    ingredients = max(0, orders - made) * INGREDIENTS_PER_SOUP - inside
-    plates = max(0, orders - soups)
-    stages += 4 * ingredients - 2 * min(ingredients, shared_ingredients) - 3 * hands_ingredients
-    stages += 4 * plates - 2 * min(plates, shared_dishes) - 3 * hands_dishes
-    stages += plates  # to deliver what is then fetched
-    last = float(cooking)
-    if ingredients > 0:
-        last = float(spec[2]) + 2 * STAGE_TICKS
-    return max(stages * STAGE_TICKS / 2 + near, last)
-
-
-@kernel
-def to_go(
-    brain: Brain, state: NDArray[int16], orders: int, beyond: int, thorough: bool, options: NDArray[int16],
-    summed: NDArray[int16],
-) -> float:  # fmt: skip
-    """The estimated ticks until `orders` and `beyond` more soups are served; fills `options` int16[2, KINDS, 4]."""
-    orders += beyond
-    team_options(brain, state, 0, orders, thorough, options[0], summed)
-    team_options(brain, state, 1, orders, thorough, options[1], summed)
-    if brain.pots[1]:
-        return _stages(brain, state, orders)
-    best = np.inf
-    for kind0 in range(KINDS):
-        if kind0 != WAIT and options[0, kind0, 0] == 0:
-            continue
-        for kind1 in range(KINDS):
-            if (kind1 != WAIT and options[1, kind1, 0] == 0) or (kind0 == WAIT and kind1 == WAIT):
-                continue
-            cost = pair_to_go(
-                brain, state, orders, kind0, options[0, kind0, 1], kind1, options[1, kind1, 1], 0
-            )
-            best = min(best, cost)
-    return best if best < np.inf else STRANDED_TICKS
-
-
-@kernel
-def pair_to_go(
-    brain: Brain,
-    state: NDArray[int16],
-    orders: int,
-    kind0: int,
-    cell0: int,
-    kind1: int,
-    cell1: int,
-    delay: int,
-) -> float:
-    """The estimated ticks until `orders` more soups are served if the chefs now take up these subtasks."""
-    at = world_of(brain.spec, state, kind0 == TAKE_SOUP or kind1 == TAKE_SOUP)
-    ahead = min(MOST_ORDERS, max(1, orders))
-    at = at // MOST_ORDERS * MOST_ORDERS + ahead - 1
-    left0 = 0.0 if kind0 == WAIT else _left(brain, state, 0, cell0)
-    left1 = 0.0 if kind1 == WAIT else _left(brain, state, 1, cell1)
-    if kind0 == WAIT:
-        left0 = left1 + 1
-    if kind1 == WAIT:
-        left1 = left0 + 1
-    return both_busy(
-        _task_of(kind0), left0 + delay, _task_of(kind1), left1 + delay, at, int(brain.pots[0]), brain.unit[0],
-        brain.robot_next, brain.human_next,
-    )  # fmt: skip
-
-
-@kernel
 def walk(
-    brain: Brain, state: NDArray[int16], cell0: int, cell1: int, wait0: bool, wait1: bool, end0: int, end1: int,
-    first: int, leg: NDArray[uint8], out: NDArray[int32],
+    brain: Brain, state: NDArray[int16], cell0: int, cell1: int, wait0: bool, wait1: bool, end0: int,
+    end1: int, first: int, leg: NDArray[uint8], out: NDArray[int32],
 ) -> int:  # fmt: skip
     """How many ticks until a chef has interacted at its tile, 0 if none does; `state` and `leg` are filled.
 
@@ -331,11 +70,11 @@ def walk(
         goal1 = 1 + cells + end1
     useful = ~(1 << BIT_BLOCKED)
     for tick in range(LEG_TICKS):
-        at0 = not wait0 and _alone(brain, state, 0, cell0) == 0 and end0 in (-1, _pose(brain, state, 0))
-        at1 = not wait1 and _alone(brain, state, 1, cell1) == 0 and end1 in (-1, _pose(brain, state, 1))
-        does0 = at0 and not _must_wait(brain, state, 0, cell0)
-        does1 = at1 and not _must_wait(brain, state, 1, cell1)
-        pose0, pose1 = _pose(brain, state, 0), _pose(brain, state, 1)
+        at0 = not wait0 and way_alone(brain, state, 0, cell0) == 0 and end0 in (-1, pose_of(brain, state, 0))
+        at1 = not wait1 and way_alone(brain, state, 1, cell1) == 0 and end1 in (-1, pose_of(brain, state, 1))
+        does0 = at0 and not must_wait(brain, state, 0, cell0)
+        does1 = at1 and not must_wait(brain, state, 1, cell1)
+        pose0, pose1 = pose_of(brain, state, 0), pose_of(brain, state, 1)
         way = first
         blocked = joint_cost(brain.joint, goal0, goal1, pose0, pose1) >= FAR
         if (way == 0 and (wait0 or at0)) or (way == 1 and (wait1 or at1)):
@@ -508,12 +247,12 @@ def search_plan(
 
 @kernel
 def _rate_pairs(
-    brain: Brain, state: NDArray[int16], orders: int, options: NDArray[int16], rated: NDArray[float32],
+    brain: Brain, state: NDArray[int16], orders: int, options: NDArray[int16], rated: NDArray[float64],
     which: NDArray[int64], summed: NDArray[int16], ahead: NDArray[int16],
 ) -> int:  # fmt: skip
     """How many pairs of subtasks there are; fills their estimates and (kind, cell, kind, cell)."""
     count = 0
-    pose0, pose1 = _pose(brain, state, 0), _pose(brain, state, 1)
+    pose0, pose1 = pose_of(brain, state, 0), pose_of(brain, state, 1)
     for kind0 in range(KINDS):
         for place0 in range(max(1, options[0, kind0, 0])):
             if kind0 != WAIT and options[0, kind0, 0] == 0:
@@ -526,8 +265,8 @@ def _rate_pairs(
                     cell1 = options[1, kind1, 1 + place1] if kind1 != WAIT else 0
                     goal0 = FREE if kind0 == WAIT else 1 + cell0
                     goal1 = FREE if kind1 == WAIT else 1 + cell1
-                    own0 = 0 if kind0 == WAIT else _alone(brain, state, 0, cell0)
-                    own1 = 0 if kind1 == WAIT else _alone(brain, state, 1, cell1)
+                    own0 = 0 if kind0 == WAIT else way_alone(brain, state, 0, cell0)
+                    own1 = 0 if kind1 == WAIT else way_alone(brain, state, 1, cell1)
                     together = joint_cost(brain.joint, goal0, goal1, pose0, pose1)
                     delay = 2 if together >= FAR else together - max(own0, own1)
                     if brain.pots[1]:

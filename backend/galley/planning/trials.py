@@ -30,7 +30,7 @@ def run(
     layout: Layout, robot: str, epsilon: float, seeds: NDArray[np.uint64], seat: int = 0,
     robot_epsilon: float = 0.0,
 ) -> Trials:  # fmt: skip
-    """One trial per seed (uint64[B]) of the layout's horizon, the robot on `seat`, a myopic human on the other.
+    """One trial per seed (uint64[B]) of the layout's horizon: the robot on `seat`, a myopic human opposite.
 
     The human makes a random action with probability `epsilon`. The same actions come from the agents
     of `robots.py` and `myopic.py` asked tick by tick with the same seeds.

@@ -9,6 +9,7 @@ shortest ways between the stations.
 Source: Fontaine et al. 2021 (RSS), App. B (the tuple S, A, T, C). Ours: subtasks of different length, so that
 either chef may be done first; several pots.
 """
+# mypy: disable-error-code="no-any-return"
 
 from __future__ import annotations
 
@@ -92,7 +93,7 @@ def done(task: int, at: int, pots: int) -> tuple[int, int]:
 
 @kernel
 def sensible(stand: int, task: int, at: int, pots: int, other: int, team: bool) -> bool:
-    """Whether a subtask makes sense at a stand while the other chef is at `other`; a team takes things ahead."""
+    """Whether a subtask makes sense while the other chef is at `other`; a team takes things ahead."""
     full = at // MOST_ORDERS % (MOST_FULL + 1)
     count = at // MOST_ORDERS // (MOST_FULL + 1)
     if stand == WITH_SOUP:
@@ -158,11 +159,12 @@ def iterate(
     robot_takes: NDArray[float64], human_takes: NDArray[float64], pots: int, unit: float,
     robot_next: NDArray[float32], human_next: NDArray[float32], team: bool,
 ) -> int:  # fmt: skip
-    """How many sweeps it took (MOST_SWEEPS: the limit was reached); fills both tables of costs to go in ticks.
+    """How many sweeps it took (MOST_SWEEPS: the limit was reached); fills both tables of costs to go.
 
-    `robot_takes`, `human_takes` float64[STANDS, TASKS]: durations. `robot_next` float32[STANDS, TASKS, LEFTS,
-    WORLDS]: the robot chooses while the human is at a task. `human_next` float32[TASKS, LEFTS, STANDS, WORLDS]:
-    the human draws while the robot is at a task; in a `team` it chooses the best as well.
+    `robot_takes`, `human_takes` float64[STANDS, TASKS]: durations in ticks, as costs are. `robot_next`
+    float32[STANDS, TASKS, LEFTS, WORLDS]: the robot chooses while the human is at a task. `human_next`
+    float32[TASKS, LEFTS, STANDS, WORLDS]: the human draws while the robot is at a task; in a `team` it
+    chooses the best as well.
     """
     robot_next[:] = 0
     human_next[:] = 0
