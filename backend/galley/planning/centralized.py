@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from galley.errors import GalleyError
-from galley.kitchen.codes import DELIVERIES, ORDERS_DELIVERED, STAY
+from galley.kitchen.codes import CELLS, CHEF, DELIVERIES, HELD, ORDERS_DELIVERED, POT_TICKS, STAY
 from galley.kitchen.layout import Layout
 from galley.kitchen.rules import step
+from galley.kitchen.trajectory import start
 from galley.planning.brain import brain
+from galley.planning.myopic import Myopic
 from galley.planning.team_kernel import LEG_TICKS, Search, search_plan
 
 ORDERS_AHEAD = 3
@@ -24,12 +26,17 @@ WIDTH_SMALL = 100
 """The same in a kitchen of at most `SMALL` floor cells."""
 SMALL = 12
 WIDTH_PLAYING = 24
-"""The same for an agent's first plan and after one has been carried out."""
-WIDTH_AFRESH = 3
-"""The same when the world has deviated from the plan, which may happen every tick."""
+"""The same for an agent's first plan, made before the round begins."""
+WIDTH_AFRESH = 2
+"""The same for every later plan, which must be there within a tick."""
 PAIRS_SMALL = 30
+PAIRS_AFRESH = 6
+ORDERS_AFRESH = 1
 PAIRS = 16
 """Pairs of subtasks tried from each node."""
+PATIENCE_TICKS = 12
+"""Ticks without anything taken, put or served after which an agent whose partner does not play its part
+goes on as the myopic human until the next soup is served."""
 MOST_TICKS = 300
 """The length of the longest plan searched for."""
 
@@ -64,6 +71,7 @@ class TeamPlanner:
         state: NDArray[np.int16],
         orders: int | None = None,
         width: int | None = None,
+        pairs: int | None = None,
         most_ticks: int = MOST_TICKS,
     ) -> TeamPlan:
         """The plan from `state` (int16[S]) until `orders` more soups are served (else `ORDERS_AHEAD`).
@@ -83,7 +91,8 @@ class TeamPlanner:
         thorough = width is None and len(self.layout.floor) <= SMALL
         if width is None:
             width = WIDTH_SMALL if thorough else WIDTH
-        pairs = PAIRS_SMALL if thorough else PAIRS
+        if pairs is None:
+            pairs = PAIRS_SMALL if thorough else PAIRS
         search = self._search(width, most_ticks)
         node, complete = search_plan(self._brain, search, state, wanted, beyond, pairs, thorough)
         legs = []
@@ -121,8 +130,9 @@ class TeamPlanner:
 class Centralized:
     """An agent that plays its part in a plan for both chefs, trusting the other to play theirs.
 
-    The plan is carried out open-loop. When the world is not as planned, a new plan is made from there;
-    without an order list also after each soup served, always for the next two orders.
+    The plan is carried out open-loop. When the world is not as planned, a new plan is made from there, and
+    from then on every plan is a quick one; without an order list there is a new plan after each soup served.
+    Who waits in vain for a partner that does not play its part cooks one soup as the myopic human does.
 
     Source: Fontaine et al. 2021 (RSS), Sec. IV "Centralized Planning".
     """
@@ -132,10 +142,12 @@ class Centralized:
         self._planner: TeamPlanner | None = None
         self._seat = 0
         self._plan: TeamPlan | None = None
-        self._at = 0
+        self._at, self._deviated, self._stalled = 0, False, 0
+        self._made = np.zeros(0, dtype=np.int16)
+        self._alone = Myopic()
 
     def reset(self, layout: Layout, seat: int, seed: int) -> None:
-        """Begin an episode; the seed changes nothing.
+        """Begin an episode with a plan; the seed settles random moves of an agent that waited in vain.
 
         Raises:
             GalleyError: the layout cannot be served (the message names the station) or is too large.
@@ -144,30 +156,51 @@ class Centralized:
             self._planner = TeamPlanner(layout)
             self._layout = layout
         self._seat = seat
-        self._plan, self._at = None, 0
+        self._plan, self._at = self._planner.plan(start(layout), width=WIDTH_PLAYING), 0
+        self._deviated, self._stalled = False, 0
+        self._made = np.full(3 + layout.width * layout.height, -1, dtype=np.int16)
+        self._alone.reset(layout, seat, seed)
 
     def act(self, state: NDArray[np.int16], tick: int) -> int:
         """This seat's part in the plan's next joint action; to stay when no plan leads on."""
-        plan, at = self._current(state)
-        self._plan, self._at = plan, at
+        self._plan, self._at, self._deviated = plan, at, _ = self._current(state)
+        if self._deviated and self._stalled >= PATIENCE_TICKS:
+            return self._alone.act(state, tick)
         return int(plan.joint_actions[at, self._seat]) if at < len(plan.joint_actions) else STAY
 
     def observe(self, state: NDArray[np.int16], joint_action: tuple[int, int]) -> None:
         """Move on in the plan that was in force in `state`."""
-        plan, at = self._current(state)
-        self._plan, self._at = plan, at + 1
+        self._plan, at, self._deviated = self._current(state)
+        self._at = at + 1
+        self._alone.observe(state, joint_action)
+        now = _made(state, self._made.size)
+        if self._stalled >= PATIENCE_TICKS:  # until the next soup is served
+            self._stalled = self._stalled if now[2] == self._made[2] else 0
+        else:
+            self._stalled = self._stalled + 1 if np.array_equal(now, self._made) else 0
+        self._made = now
 
-    def _current(self, state: NDArray[np.int16]) -> tuple[TeamPlan, int]:
-        """The plan in force in a state, and the place of the state in it."""
-        if self._planner is None:
+    def _current(self, state: NDArray[np.int16]) -> tuple[TeamPlan, int, bool]:
+        """The plan in force in a state, the place of the state in it, and whether the world ever deviated."""
+        if self._planner is None or self._plan is None:
             raise GalleyError("the agent has no layout yet; call reset first")
         plan, at = self._plan, self._at
-        listed = self._planner.layout.rules.orders is not None
-        if plan is None:
-            return self._planner.plan(state, width=WIDTH_PLAYING), 0
         if at >= len(plan.states) or not np.array_equal(plan.states[at], state):
-            return self._planner.plan(state, width=WIDTH_AFRESH), 0
+            return _afresh(self._planner, state), 0, True
         served = state[DELIVERIES] > plan.states[0][DELIVERIES]
-        if at == len(plan.joint_actions) or (served and not listed):
-            return self._planner.plan(state, width=WIDTH_PLAYING), 0
-        return plan, at
+        listed = self._planner.layout.rules.orders is not None
+        if at < len(plan.joint_actions) and (listed or not served):
+            return plan, at, self._deviated
+        return _afresh(self._planner, state), 0, self._deviated
+
+
+def _afresh(planner: TeamPlanner, state: NDArray[np.int16]) -> TeamPlan:
+    return planner.plan(state, orders=ORDERS_AFRESH, width=WIDTH_AFRESH, pairs=PAIRS_AFRESH)
+
+
+def _made(state: NDArray[np.int16], size: int) -> NDArray[np.int16]:
+    """int16[3 + H*W]: what is held, soups served, what lies about and is in pots, cooking times left out."""
+    found = np.empty(size, dtype=np.int16)
+    found[0], found[1], found[2] = state[HELD], state[CHEF + HELD], state[DELIVERIES]
+    found[3:] = state[CELLS:] % POT_TICKS
+    return found

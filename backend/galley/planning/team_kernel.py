@@ -174,7 +174,7 @@ def search_plan(
     summed = np.zeros(brain.reach.shape[1], dtype=np.int16)
     most = (KINDS * 3 + 1) ** 2
     rated = np.empty(most, dtype=np.float64)
-    which = np.empty((most, 4), dtype=np.int64)
+    which = np.empty((most, 5), dtype=np.int64)
     served = start[DELIVERIES]
     search.counts[0] = 1
     search.states[0] = start
@@ -220,7 +220,8 @@ def search_plan(
                         if which1 >= 0 and end1 < 0:
                             break
                         for first in range(2, -1, -1):
-                            if first < 2 and (wait0 or wait1):
+                            # The right of way matters only where the chefs are in each other's way.
+                            if first < 2 and (wait0 or wait1 or (pick[4] == 0 and not thorough)):
                                 continue
                             state[:] = now
                             length = walk(
@@ -250,7 +251,7 @@ def _rate_pairs(
     brain: Brain, state: NDArray[int16], orders: int, options: NDArray[int16], rated: NDArray[float64],
     which: NDArray[int64], summed: NDArray[int16], ahead: NDArray[int16],
 ) -> int:  # fmt: skip
-    """How many pairs of subtasks there are; fills their estimates and (kind, cell, kind, cell)."""
+    """How many pairs of subtasks there are; fills their estimates and (kind, cell, kind, cell, delay)."""
     count = 0
     pose0, pose1 = pose_of(brain, state, 0), pose_of(brain, state, 1)
     for kind0 in range(KINDS):
@@ -277,5 +278,6 @@ def _rate_pairs(
                     which[count, 1] = cell0
                     which[count, 2] = kind1
                     which[count, 3] = cell1
+                    which[count, 4] = delay
                     count += 1
     return count
