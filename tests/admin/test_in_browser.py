@@ -31,6 +31,8 @@ def page(browser: Browser, office: Office) -> Iterator[Page]:
     page.on("pageerror", lambda error: wrong.append(str(error)))
     page.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
     page.goto(f"{office.url}/researcher")
+    # The first field takes the focus by itself, a moment after the page has loaded on a slow machine.
+    page.locator("input[name=name]:focus").wait_for()
     page.keyboard.type(NAME)
     page.keyboard.press("Tab")
     page.keyboard.type(PASSWORD)
