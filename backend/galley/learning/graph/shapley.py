@@ -102,7 +102,7 @@ def exact_shapley(worths: NDArray[np.float64]) -> NDArray[np.float64]:
 def _add_marginals(
     worths: NDArray[np.float64], orders: NDArray[np.int64], totals: NDArray[np.float64]
 ) -> None:
-    """Adds to `totals` [n] what each strategy adds in each order, with the sum over pairs kept as it grows."""
+    """Adds to `totals` [n] what each strategy adds in each order, keeping the growing sum over pairs."""
     size = len(worths)
     for order in orders:
         pairs = 0.0
