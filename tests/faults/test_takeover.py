@@ -53,7 +53,7 @@ items:
 
 BOTH = (
     STUDY.replace("title: One round", "title: Two cooks")
-    .replace("agents: [myopic]", "agents: [human]")
+    .replace("agents: [myopic]", "skippable: true, agents: [human]")
     .replace("  - {kind: questionnaire, id: open, questionnaire: open}\n", "")
 )
 
@@ -65,13 +65,18 @@ def lab(folder: Path) -> Path:
     return workspace.path
 
 
-def two_at_the_round(server: Server | Served) -> tuple[str, str]:
-    """The paths of two new visits that were paired."""
-    with httpx.Client(base_url=server.url, follow_redirects=True, timeout=30) as http:
-        paths = [http.post("/s/both/begin").url.path for _ in range(2)]
-        for path in paths:
-            http.post(path, data={"step": "consent", "choice": "agree"})
-        assert all('data-stage="round"' in http.get(path).text for path in paths)
+def two_at_the_round(server: Server | Served, other: Server | None = None) -> tuple[str, str]:
+    """The paths of two new visits that were paired, the second of whom came to the other server."""
+    servers = (server, other or server)
+    with httpx.Client(follow_redirects=True, timeout=30) as http:
+        paths = []
+        for at in servers:
+            page = http.post(f"{at.url}/s/both/begin")
+            paths.append(page.url.path)
+            page = http.post(str(page.url), data={"step": "consent", "choice": "agree"})
+            assert f'data-stage="{"round" if len(paths) == 2 else "lobby"}"' in page.text
+        pages = [http.get(at.url + path) for at, path in zip(servers, paths, strict=True)]
+        assert all('data-stage="round"' in page.text for page in pages)
     return paths[0], paths[1]
 
 
@@ -216,20 +221,85 @@ def test_a_round_of_two_people_stays_with_its_server_while_that_lives(
         with player(pair[0], paths[1]) as two:
             play_together(one, two, 20)
         assert one.until("paused")["reason"] == "partner"
-        with player(pair[1], paths[1]) as astray:
-            astray.send("hello", protocol=1, tab="tab")
-            assert astray.closed_with() == 1013
-        _, ended = go_on(pair[0], paths[1])
+        frame, ended = go_on(pair[1], paths[1])
+        assert frame["phase"] == "paused"
         assert ended["outcome"] == one.until("ended")["outcome"] == "finished"
     whole(postgres.url("two"), "both", paths[0])
+
+
+def test_two_people_who_came_to_different_servers_are_paired_and_play(
+    postgres: Postgres, pair: tuple[Server, Server]
+) -> None:
+    paths = two_at_the_round(*pair)
+    with player(pair[0], paths[0], "a") as one, player(pair[1], paths[1], "b") as two:
+        play_together(one, two, 20)
+        two.key("right", True)
+        one.key("left", True)
+        assert one.until("ended")["outcome"] == two.until("ended")["outcome"] == "finished"
+        seen = [[m for m in p.received if m["type"] == "tick"] for p in (one, two)]
+    assert seen[0] == seen[1]
+    assert [message["tick"] for message in seen[0]] == list(range(1, TICKS + 1))
+    debrief(pair[1], paths[0])
+    debrief(pair[0], paths[1])
+    whole(postgres.url("two"), "both", paths[0])
+    with Store.open(postgres.url("two")) as store:
+        rows = [store.visit(path.rsplit("/", 1)[1]).result() for path in paths]
+        rounds = [store.open_round(row.id, "rounds-1").result() for row in rows if row is not None]
+        assert rounds[0] is not None
+        assert rounds[1] is not None
+        assert rounds[0].id == rounds[1].id
+        assert (rounds[0].joint_actions != 4).any(axis=0).all(), "the keys of both arrived"
+
+
+def test_who_leaves_at_another_server_is_missed_at_once(
+    postgres: Postgres, pair: tuple[Server, Server]
+) -> None:
+    paths = two_at_the_round(*pair)
+    with player(pair[0], paths[0], "a") as one:
+        with player(pair[1], paths[1], "b") as two:
+            play_together(one, two, 10)
+        assert one.until("paused")["reason"] == "partner"
+        page = httpx.post(
+            pair[1].url + paths[1], data={"step": "rounds-1", "skip": "1"}, follow_redirects=True, timeout=30
+        )
+        assert page.status_code == 200
+        assert 'data-stage="debrief"' in page.text
+        assert one.until("ended")["outcome"] == "partner_left"
+    debrief(pair[1], paths[0])
+
+
+def test_people_who_come_to_two_servers_at_once_are_each_paired_once(
+    postgres: Postgres, pair: tuple[Server, Server]
+) -> None:
+    def come(number: int) -> str:
+        at = pair[number % 2].url
+        with httpx.Client(follow_redirects=True, timeout=30) as http:
+            path = http.post(f"{at}/s/both/begin").url.path
+            http.post(at + path, data={"step": "consent", "choice": "agree"})
+
+            def asks() -> None:
+                if http.get(f"{at}{path}/lobby").json()["waiting"]:
+                    raise TimeoutError
+
+            until_it_goes(asks)
+        return path
+
+    with ThreadPoolExecutor(8) as people:
+        paths = list(people.map(come, range(8)))
+    with Store.open(postgres.url("two")) as store:
+        visits = [store.visit(path.rsplit("/", 1)[1]).result() for path in paths]
+        rounds = [store.open_round(visit.id, "rounds-1").result() for visit in visits if visit is not None]
+        ids = [row.id for row in rounds if row is not None]
+    assert len(ids) == 8
+    assert all(ids.count(one) == 2 for one in ids)
 
 
 def test_a_round_whose_server_dies_is_finished_at_another(
     postgres: Postgres, pair: tuple[Server, Server]
 ) -> None:
     one, two = pair
-    path, paths = at_the_round(one), two_at_the_round(one)
-    with player(one, path) as before, player(one, paths[0]) as left, player(one, paths[1]) as right:
+    path, paths = at_the_round(one), two_at_the_round(one, two)
+    with player(one, path) as before, player(one, paths[0]) as left, player(two, paths[1]) as right:
         play_together(left, right, 5)
         play_until(before, 50)
         one.process.kill()

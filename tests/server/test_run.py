@@ -13,7 +13,8 @@ import pytest
 
 from galley.errors import GalleyError, InvalidFiles
 from galley.records import Store
-from galley.server.run import serve
+from galley.records.engine import database_url
+from galley.server.run import reached_at, serve
 from tests.server.helpers import ONE_ROUND
 from tests.study.workspaces import study_workspace
 
@@ -33,6 +34,18 @@ def test_an_address_that_is_not_ours(tmp_path: Path) -> None:
         serve(lab.path, host="203.0.113.1", port=0, environ={})
     with pytest.raises(GalleyError, match="cannot listen on no such host"):
         serve(lab.path, host="no such host", port=0, environ={})
+
+
+def test_where_other_processes_reach_one(tmp_path: Path) -> None:
+    def told(host: str, database: str) -> str:
+        with socket.create_server((host, 0)) as listening:
+            address = reached_at(listening, database_url(database))
+            return address.replace(str(listening.getsockname()[1]), "PORT")
+
+    assert told("127.0.0.1", "postgresql://db.example.org/galley") == "127.0.0.1:PORT"
+    assert told("0.0.0.0", "postgresql://127.0.0.1/galley") == "127.0.0.1:PORT", "on the way to the database"
+    assert told("0.0.0.0", "postgresql://no-such-host.invalid/galley") == "127.0.0.1:PORT"
+    assert told("0.0.0.0", str(tmp_path / "records.sqlite")) == ""
 
 
 def test_a_database_that_is_served_already(tmp_path: Path) -> None:

@@ -33,6 +33,7 @@ def test_an_option_goes_before_the_environment_and_that_before_the_default() -> 
         ({"PORT": "eighty"}, "PORT: 'eighty' is not possible; use a whole number from 0 to 65535"),
         ({"PORT": "65536"}, "PORT: '65536'"),
         ({"THINK_WINDOW_MS": "-1"}, "THINK_WINDOW_MS: '-1'"),
+        ({"REACHED_AT": "http://app:8000"}, "REACHED_AT: 'http://app:8000' is no address; write HOST:PORT"),
         ({"LOG_LEVEL": "loud"}, "LOG_LEVEL: 'loud' is no log level; use one of error, warning, info, debug"),
     ],
 )

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
+from operator import itemgetter
 from typing import Any
 
-from sqlalchemy import Connection, Engine, bindparam, func, select, update
+from sqlalchemy import Connection, Engine, Table, bindparam, func, select, update
 
 from galley.records.engine import insert_into
 from galley.records.leases import Lease
 from galley.records.rows import ClockRow, KeyRow, PauseRow, TickRow
 from galley.records.tables import CLOCKS, KEYS, PAUSES, SEATS, TICKS, VISITS
+
+MOST_AT_ONCE = 256
+"""So many rows go in with one statement: ten values each, far from what either database allows."""
 
 
 @dataclass(slots=True)
@@ -37,11 +42,9 @@ class Journal:
 
     def seen(self) -> dict[int, float]:
         """For each seat, when its person last gave a sign of life, in ms since 1970."""
-        found: dict[int, float] = {}
-        for seat, at_ms in (
-            *((key.seat, key.arrival_ms) for key in self.keys),
-            *((ping.seat, ping.server_ms) for ping in self.clocks),
-        ):
+        # Rows come in the order of time, so that the last of a seat is its newest.
+        found = {key.seat: key.arrival_ms for key in self.keys}
+        for seat, at_ms in {ping.seat: ping.server_ms for ping in self.clocks}.items():
             found[seat] = max(at_ms, found.get(seat, 0.0))
         return found
 
@@ -50,8 +53,9 @@ class JournalInserts:
     """Writes journals. A row that is there already stays as it is; a pause learns its end."""
 
     def __init__(self, engine: Engine) -> None:
-        kept = {table.name: insert_into(engine, table) for table in (TICKS, KEYS, CLOCKS)}
-        self._ticks, self._keys, self._clocks = (new.on_conflict_do_nothing() for new in kept.values())
+        self._ticks = ManyRows(engine, TICKS, TickRow)
+        self._keys = ManyRows(engine, KEYS, KeyRow)
+        self._clocks = ManyRows(engine, CLOCKS, ClockRow)
         pause = insert_into(engine, PAUSES)
         self._pauses = pause.on_conflict_do_update(
             index_elements=[PAUSES.c.round_id, PAUSES.c.started_ms],
@@ -68,9 +72,13 @@ class JournalInserts:
 
     def write(self, connection: Connection, batch: Mapping[int, Journal]) -> None:
         """Insert the rows of all rounds in `batch`."""
-        for statement, rows in self._statements(batch):
-            if rows:
-                connection.execute(statement, rows)
+        journals = batch.items()
+        self._ticks.insert(connection, [(i, row) for i, rows in journals for row in rows.ticks])
+        self._keys.insert(connection, [(i, row) for i, rows in journals for row in rows.keys])
+        self._clocks.insert(connection, [(i, row) for i, rows in journals for row in rows.clocks])
+        # One by one: the beginning and the end of a pause may both be here, and are one row.
+        if pauses := [{"round_id": i, **row._asdict()} for i, rows in journals for row in rows.pauses]:
+            connection.execute(self._pauses, pauses)
 
     def write_seen(self, connection: Connection, seen: Mapping[tuple[int, int], float]) -> None:
         """Note when people were last seen, by round and seat."""
@@ -81,17 +89,40 @@ class JournalInserts:
         if rows:
             connection.execute(self._seen, rows)
 
-    def _statements(self, batch: Mapping[int, Journal]) -> Iterator[tuple[Any, list[dict[str, Any]]]]:
-        journals = batch.items()
-        yield self._ticks, _with_round((i, rows.ticks) for i, rows in journals)
-        yield self._keys, _with_round((i, rows.keys) for i, rows in journals)
-        yield self._pauses, _with_round((i, rows.pauses) for i, rows in journals)
-        yield self._clocks, _with_round((i, rows.clocks) for i, rows in journals)
 
+class ManyRows:
+    """Inserts rows of one kind, many with one statement; one that is there already stays as it is.
 
-def _with_round(journals: Iterable[tuple[int, Iterable[Any]]]) -> list[dict[str, Any]]:
-    return [
-        {"round_id": round_id, **{name: getattr(row, name) for name in row.__slots__}}
-        for round_id, rows in journals
-        for row in rows
-    ]
+    The database works through a statement without holding the interpreter, which live rounds need: row by
+    row it would be taken from them and given back thousands of times a flush. `kind` is a named tuple whose
+    fields are the table's columns, all but `round_id`.
+    """
+
+    def __init__(self, engine: Engine, table: Table, kind: type[tuple[Any, ...]]) -> None:
+        self._new = insert_into(engine, table)
+        by_place = engine.dialect.paramstyle
+        self._dialect = type(engine.dialect)(paramstyle="qmark" if by_place == "qmark" else "format")
+        self._columns = [column.name for column in table.c]
+        fields: Sequence[str] = kind._fields  # type: ignore[attr-defined]
+        self._pick = itemgetter(*(fields.index(name) for name in self._columns if name != "round_id"))
+        self._texts: dict[int, str] = {}
+
+    def insert(self, connection: Connection, rows: Sequence[tuple[int, Any]]) -> None:
+        """Insert rows, each with its round."""
+        begin = 0
+        while begin < len(rows):
+            # Powers of two, so that there are few different statements to prepare.
+            count = min(MOST_AT_ONCE, 1 << ((len(rows) - begin).bit_length() - 1))
+            connection.exec_driver_sql(self._text(count), self._values(rows[begin : begin + count]))
+            begin += count
+
+    def _values(self, rows: Iterable[tuple[int, Any]]) -> tuple[Any, ...]:
+        pick = self._pick
+        return tuple(chain.from_iterable((round_id, *pick(row)) for round_id, row in rows))
+
+    def _text(self, count: int) -> str:
+        if count not in self._texts:
+            marks = [dict.fromkeys(self._columns)] * count
+            statement = self._new.values(marks).on_conflict_do_nothing()
+            self._texts[count] = str(statement.compile(dialect=self._dialect))
+        return self._texts[count]

@@ -59,8 +59,12 @@ def now_ms(connection: Connection) -> int:
     return round(time.time() * 1000)
 
 
-def take(connection: Connection, round_id: int, owner: str, ttl_s: float, steal: bool) -> int | None:
+def take(
+    connection: Connection, round_id: int, owner: str, ttl_s: float, steal: bool, address: str | None = None
+) -> int | None:
     """The number of the new lease of `owner`; None if another process holds one that has not run out.
+
+    `address` is where other processes reach the owner.
 
     Raises: GalleyError if there is no such round.
     """
@@ -68,7 +72,7 @@ def take(connection: Connection, round_id: int, owner: str, ttl_s: float, steal:
         raise GalleyError(f"there is no round {round_id}")
     now = now_ms(connection)
     new = insert_into(connection.engine, LEASES).values(
-        round_id=round_id, owner=owner, number=1, expires_ms=now + round(ttl_s * 1000)
+        round_id=round_id, owner=owner, number=1, expires_ms=now + round(ttl_s * 1000), address=address
     )
     free = (LEASES.c.expires_ms <= now) | LEASES.c.owner.is_(None) | (LEASES.c.owner == owner)
     taken = new.on_conflict_do_update(
@@ -76,11 +80,18 @@ def take(connection: Connection, round_id: int, owner: str, ttl_s: float, steal:
         set_={
             "owner": new.excluded.owner,
             "expires_ms": new.excluded.expires_ms,
+            "address": new.excluded.address,
             "number": LEASES.c.number + 1,
         },
         where=None if steal else free,
     )
     return connection.execute(taken.returning(LEASES.c.number)).scalar_one_or_none()
+
+
+def address(connection: Connection, round_id: int) -> str | None:
+    """Where the process is that has a round; None if nobody has it or it did not say."""
+    query = select(LEASES.c.address).where(LEASES.c.round_id == round_id, LEASES.c.owner.is_not(None))
+    return connection.execute(query).scalar_one_or_none()
 
 
 def fence(connection: Connection, leases: Iterable[Lease]) -> tuple[Lease, ...]:

@@ -8,9 +8,10 @@ from concurrent.futures import Future
 from sqlalchemy import Connection
 
 from galley.kitchen.trajectory import Trajectory
-from galley.records import leases, queries, round_jobs
+from galley.records import leases, lobby, queries, round_jobs
 from galley.records.journal import Journal
 from galley.records.leases import Lease
+from galley.records.lobby import Together, Waits
 from galley.records.replay import trajectories_of
 from galley.records.rows import ClockRow, KeyRow, NewRound, PauseRow, RoundRow, SeatRow, TickRow
 from galley.records.store_base import StoreBase
@@ -57,17 +58,30 @@ class RoundStore(StoreBase):
         """
         return self.write(lambda connection: queries.round_of(connection, visit_id, step_id), first="all")
 
+    def wait_for_partner(self, waits: Waits, gone_s: float, together: Together) -> Future[int | None]:
+        """The id of the round of a visit that waits for another person; None while nobody is there.
+
+        Who asked last `gone_s` seconds ago does not wait any more. `together` says what round two visits
+        play; it is called in the writer's thread. Servers take turns, so nobody is paired twice.
+        """
+        return self.write(lambda connection: lobby.wait(connection, waits, gone_s, together))
+
+    def stop_waiting(self, visit_id: int, step_id: str) -> Future[int | None]:
+        """None once nobody can be paired with the visit at this step; its round if it was paired before."""
+        return self.write(lambda connection: lobby.stop(connection, visit_id, step_id))
+
     def lease_round(
-        self, round_id: int, owner: str, ttl_s: float, steal: bool = False
+        self, round_id: int, owner: str, ttl_s: float, steal: bool = False, address: str | None = None
     ) -> Future[Lease | None]:
         """The right of process `owner` to write the round; None while another process has it.
 
         It runs for `ttl_s` seconds of the database's clock and is renewed by this store until it is released,
         the round is finished, or it is `lost`. With `steal` it is taken from a process that still has it.
+        `address` is where other processes reach this one.
         """
 
         def work(connection: Connection) -> Lease | None:
-            number = leases.take(connection, round_id, owner, ttl_s, steal)
+            number = leases.take(connection, round_id, owner, ttl_s, steal, address)
             return None if number is None else Lease(round_id, owner, number, ttl_s)
 
         # Held from the writer's thread, so that a result nobody waits for any more is renewed all the same.

@@ -254,6 +254,7 @@ LEASES = Table(
     _of("owner", String(64), "the serving process that plays the round; empty if none", nullable=True),
     _of("number", Integer, "grows each time the round changes hands; only the last may write"),
     _of("expires_ms", BigInteger, "until when it is the owner's, by the database's clock"),
+    _of("address", String(300), "where other serving processes reach the owner, host:port", nullable=True),
     info={"meaning": "one row per round: which of several serving processes it belongs to"},
 )
 
@@ -271,6 +272,18 @@ SEATS = Table(
     ForeignKeyConstraint(["visit_id"], ["visits.id"], ondelete="CASCADE"),
     UniqueConstraint("visit_id", "step_id"),
     info={"meaning": "two rows per round: who sat where"},
+)
+
+WAITING = Table(
+    "waiting",
+    METADATA,
+    _of("visit_id", _ROW_ID, "the visit", ForeignKey("visits.id", ondelete="CASCADE"), primary_key=True),
+    _of("step_id", String(200), "the round it waits for"),
+    _of("step_index", Integer, "position of that round in its plan, from 0"),
+    _of("pairing", Text, "two visits may play together when this is the same"),
+    _of("since_ms", BigInteger, "since when it waits, by the database's clock"),
+    _of("asked_ms", BigInteger, "when its page asked last, by the database's clock"),
+    info={"meaning": "one row per visit that waits for another person to play with"},
 )
 
 STAND_INS = Table(

@@ -24,10 +24,11 @@ from galley.records import Store
 from galley.server.admin.pages import researcher_pages
 from galley.server.clock import Clock
 from galley.server.lobby import Lobby
-from galley.server.matches import Matches, round_layout
+from galley.server.matches import Matches
 from galley.server.origin import HEADERS, SecureHeaders
 from galley.server.pages import NO_PAGE, NOT_FOUND, Pages, templates
 from galley.server.play import Play
+from galley.server.setting_up import round_layout
 from galley.server.settings import Settings
 from galley.server.thinking import Thinking
 from galley.server.visits import Visits
@@ -71,14 +72,14 @@ def create_app(workspace: Workspace, store: Store, settings: Settings, *, previe
     thinking = Thinking(settings.think_window_ms / 1000.0)
     catalogues = Catalogues.load()
     visits = Visits(store, studies, clock, catalogues, preview=preview)
-    matches = Matches(store, visits, catalogue, layouts, thinking, clock)
+    matches = Matches(store, visits, catalogue, layouts, thinking, clock, settings.reached_at)
     frontend = frontend_folder()
     environment = templates(str(frontend / "templates"), catalogues)
     pages = Pages(
         studies,
         visits,
         matches,
-        Lobby(matches, visits, clock),
+        Lobby(store, matches, visits, clock),
         store,
         clock,
         environment,

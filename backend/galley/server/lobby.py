@@ -6,7 +6,10 @@ import asyncio
 import math
 from dataclasses import dataclass
 from typing import Final
+from weakref import WeakValueDictionary
 
+from galley.records import Store
+from galley.records.lobby import Waits
 from galley.server.clock import Clock
 from galley.server.matches import Matches
 from galley.server.visits import Visit, Visits
@@ -32,47 +35,32 @@ class Meeting:
     waited_s: int = 0
 
 
-@dataclass(slots=True)
-class _Waiting:
-    visit: Visit
-    since_s: float
-    asked_s: float
-
-
 class Lobby:
-    """Pairs people who wait in this process for the same round of the same study.
+    """Pairs people who wait for the same round of the same study, at this serving process or another.
 
-    Two visits fit when the study, the `pairing` of their steps and whether they are tests are the same. Who
-    waited longest goes first and gets the seat of their plan. Who waits too long meets the round's fallback.
+    Who waits is in the records, where one process at a time pairs two of them. Two visits fit when the study,
+    the `pairing` of their steps and whether they are tests are the same. Who waited longest goes first and
+    gets the seat of their plan. Who waits too long meets the round's fallback.
     """
 
-    def __init__(self, matches: Matches, visits: Visits, clock: Clock) -> None:
+    def __init__(self, store: Store, matches: Matches, visits: Visits, clock: Clock) -> None:
+        self._store = store
         self._matches = matches
         self._visits = visits
         self._clock = clock
-        self._waiting: dict[int, _Waiting] = {}
-        self._pairing = asyncio.Lock()
-
-    def __len__(self) -> int:
-        return len(self._waiting)
+        self._locks: WeakValueDictionary[int, asyncio.Lock] = WeakValueDictionary()
 
     async def see(self, visit: Visit) -> Meeting:
         """How it stands with the round of a participant who asks just now; they are paired if they can be."""
-        async with self._pairing:
+        async with self._lock(visit):
             begun = await self._begun(visit)
             if begun is not None:
                 return begun
-            now_s = self._clock.now()
-            there = self._waiting.get(visit.row.id)
-            since_s = now_s if there is None else there.since_s
-            self._waiting[visit.row.id] = _Waiting(visit, since_s, now_s)
-            other = await self._other(visit, now_s)
-            if other is not None:
-                first, second = (other, visit) if self._came_before(other, visit) else (visit, other)
-                await self._matches.set_up(first, "", also=second)
-                for one in (first, second):
-                    self._waiting.pop(one.row.id, None)
-                return Meeting(waiting=False, begun=True)
+            found = await asyncio.wrap_future(
+                self._store.wait_for_partner(_waits(visit), GONE_S, self._matches.together)
+            )
+            if found is not None:
+                return await self._begun(visit) or Meeting(waiting=False, begun=True)
             waited_s = visit.spent_s(self._clock.ms())
             left_s = visit.step.data["lobby"]["wait_s"] - waited_s
             if left_s <= 0:
@@ -81,34 +69,20 @@ class Lobby:
 
     async def leave(self, visit: Visit) -> None:
         """Somebody does not want to wait any longer: what follows nobody coming follows at once."""
-        async with self._pairing:
+        async with self._lock(visit):
             if await self._begun(visit) is None:
                 await self._fall_back(visit)
 
     async def _begun(self, visit: Visit) -> Meeting | None:
         if not await self._matches.begun(visit):
             return None
-        self._waiting.pop(visit.row.id, None)
         return Meeting(waiting=False, begun=True, alone=await self._matches.with_agent(visit))
 
-    async def _other(self, visit: Visit, now_s: float) -> Visit | None:
-        """Who waited longest of those that fit, as their visit is now."""
-        for waiting in sorted(self._waiting.values(), key=lambda waiting: waiting.since_s):
-            if now_s - waiting.asked_s > GONE_S:
-                del self._waiting[waiting.visit.row.id]
-            elif _fit(visit, waiting.visit):
-                found = await self._visits.find(waiting.visit.row.token)
-                if found is not None and found.active and found.step.id == waiting.visit.step.id:
-                    return found
-                del self._waiting[waiting.visit.row.id]
-        return None
-
-    def _came_before(self, one: Visit, other: Visit) -> bool:
-        return self._waiting[one.row.id].since_s <= self._waiting[other.row.id].since_s
-
     async def _fall_back(self, visit: Visit) -> Meeting:
-        self._waiting.pop(visit.row.id, None)
+        paired = await asyncio.wrap_future(self._store.stop_waiting(visit.row.id, visit.step.id))
         fallback = visit.step.data["lobby"]["fallback"]
+        if paired is not None:
+            return await self._begun(visit) or Meeting(waiting=False, begun=True)
         if fallback == EXIT:
             await self._visits.happened(visit, Ended(visit.step.id, "partner_missing"))
         elif fallback == GO_ON:
@@ -118,15 +92,10 @@ class Lobby:
             return Meeting(waiting=False, begun=True, alone=True)
         return Meeting(waiting=False)
 
+    def _lock(self, visit: Visit) -> asyncio.Lock:
+        return self._locks.setdefault(visit.row.id, asyncio.Lock())
 
-def _fit(one: Visit, other: Visit) -> bool:
-    same = all(
-        mine == theirs
-        for mine, theirs in (
-            (one.row.study, other.row.study),
-            (one.row.study_sha256, other.row.study_sha256),
-            (one.row.test, other.row.test),
-            (one.step.data["pairing"], other.step.data["pairing"]),
-        )
-    )
-    return same and one.row.id != other.row.id
+
+def _waits(visit: Visit) -> Waits:
+    step = visit.step
+    return Waits(visit.row.id, step.id, visit.progress.step_index, step.data["pairing"])

@@ -13,7 +13,7 @@ from weakref import WeakValueDictionary
 
 from galley.agents.catalogue import Catalogue
 from galley.kitchen import Layout
-from galley.records import Lease, NewRound, RoundRow, SeatRow, Store, queries
+from galley.records import Lease, NewRound, RoundRow, Store, VisitRow, leases, queries
 from galley.records.replay import state_bytes
 from galley.server import wire
 from galley.server.catching_up import caught_up, ready_agent
@@ -23,6 +23,7 @@ from galley.server.journal import RoundJournal
 from galley.server.match import Match
 from galley.server.person import Person
 from galley.server.round_spec import END_ROUND, RoundSpec
+from galley.server.setting_up import of_one, of_two
 from galley.server.thinking import Mind, Thinking
 from galley.server.visits import Visit, Visits
 from galley.study.progress import RoundEnded
@@ -33,7 +34,14 @@ LEASE_S = 10.0
 
 
 class RoundBusy(Exception):
-    """The round is played at another serving process, which lives: the browser has to get there."""
+    """The round is played at another serving process, which lives: the browser has to get there.
+
+    `address` is where that process is reached, "" if nobody knows.
+    """
+
+    def __init__(self, round_id: int, address: str) -> None:
+        super().__init__(f"round {round_id} is played at another server")
+        self.address = address
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +66,8 @@ class Matches:
 
     A round belongs to one serving process at a time, by a lease in the records. A person who plays with an
     agent and connects here takes the round along from wherever it was. A round of two people is only taken
-    once the process that had it is gone, for both must meet in one process.
+    once the process that had it is gone, for both must meet in one process. `address` is where other
+    processes reach this one.
     """
 
     def __init__(
@@ -69,7 +78,9 @@ class Matches:
         layouts: Mapping[str, Layout],
         thinking: Thinking,
         clock: Clock,
+        address: str = "",
     ) -> None:
+        self._address = address or None
         self._store = store
         self._visits = visits
         self._catalogue = catalogue
@@ -179,33 +190,16 @@ class Matches:
 
     # ---- setting up ----------------------------------------------------------------------------------------
 
-    async def set_up(self, visit: Visit, agent: str, *, also: Visit | None = None) -> int:
-        """The id of the round of a visit's step, set up with an agent, or with the visit `also`.
-
-        Who is named first gets the seat of their plan.
-        """
-        data = visit.step.data
-        layout = round_layout(self._layouts, data)
-        seat = int(data["human_seat"])
-        own = SeatRow(seat, visit.row.id, visit.step.id, hat=data["human_hat"])
-        if also is not None:
-            hat = also.step.data["human_hat"]
-            other = SeatRow(1 - seat, also.row.id, also.step.id, hat=hat)
-        else:
-            bundle = self._catalogue.bundle(agent)
-            other = SeatRow(1 - seat, None, None, bundle.name, bundle.sha256, data["partner_hat"])
-        new = NewRound(
-            data["round_no"],
-            layout.name,
-            json.dumps(layout.to_dict()),
-            layout.rules.horizon_ticks,
-            data["tick_ms"],
-            data["seed"],
-            self._clock.ms(),
-            (own, other) if seat == 0 else (other, own),
-            data["episodes"],
-        )
+    async def set_up(self, visit: Visit, agent: str) -> int:
+        """The id of the round of a visit's step, set up with an agent."""
+        bundle = self._catalogue.bundle(agent)
+        sits = visit.row.id, visit.step
+        new = of_one(self._layouts, *sits, bundle.name, bundle.sha256, self._clock.ms())
         return await asyncio.wrap_future(self._store.set_up_round(new))
+
+    def together(self, first: VisitRow, second: VisitRow) -> NewRound:
+        """The round that two visits play at their steps; for the writer's thread."""
+        return of_two(self._layouts, first, second, self._clock.ms())
 
     async def _glance(self, visit: Visit) -> RoundRow | None:
         """The round as far as it is committed, without troubling the writer: pages ask often."""
@@ -241,10 +235,11 @@ class Matches:
             return None
         steal = visit.step.data["partner"] != "human"
         lease = await asyncio.wrap_future(
-            self._store.lease_round(round_id, self._owner, LEASE_S, steal=steal)
+            self._store.lease_round(round_id, self._owner, LEASE_S, steal=steal, address=self._address)
         )
         if lease is None:
-            raise RoundBusy(f"round {round_id} is played at another server")
+            where = self._store.read(lambda connection: leases.address(connection, round_id) or "")
+            raise RoundBusy(round_id, await asyncio.wrap_future(where))
         return lease
 
     def _seat(self, visit: Visit, live: _Live) -> Place | None:
@@ -395,11 +390,6 @@ class Matches:
 
     def _lock(self, what: str, number: int) -> asyncio.Lock:
         return self._locks.setdefault((what, number), asyncio.Lock())
-
-
-def round_layout(layouts: Mapping[str, Layout], data: Mapping[str, Any]) -> Layout:
-    """The layout of a round step, with the round's length as its horizon."""
-    return layouts[data["layout"]].with_rules(horizon_ticks=data["ticks"])
 
 
 def _with_agent(row: RoundRow) -> bool:

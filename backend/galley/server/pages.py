@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 from urllib.parse import urlencode
 
@@ -10,12 +11,14 @@ import jinja2
 from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
 
+from galley.errors import GalleyError
 from galley.records import Store
 from galley.server.clock import Clock
 from galley.server.forms import FormError, read_form
 from galley.server.lobby import Lobby, Meeting
-from galley.server.matches import Matches
+from galley.server.matches import Matches, RoundBusy
 from galley.server.origin import same_origin
+from galley.server.relay import RELAYED, hand_over
 from galley.server.step_pages import (
     common_context,
     ending_context,
@@ -214,7 +217,7 @@ class Pages:
         if overdue is not None:
             await self._out_of_time(visit, overdue)
         elif step.kind == "round":
-            await self._round_form(visit, form)
+            await self._round_form(visit, form, relayed=RELAYED in request.headers)
         elif "skip" in form and step.skippable:
             await self._visits.happened(visit, Skipped(step.id))
         else:
@@ -242,15 +245,21 @@ class Pages:
             await self._visits.happened(visit, happening, answers, questionnaire)
         return None
 
-    async def _round_form(self, visit: Visit, form: Mapping[str, list[str]]) -> None:
+    async def _round_form(self, visit: Visit, form: Mapping[str, list[str]], *, relayed: bool) -> None:
         if "skip" in form:
-            await self._matches.skip(visit)
+            try:
+                await self._matches.skip(visit)
+            except RoundBusy as busy:
+                if relayed or not busy.address:
+                    raise GalleyError(str(busy)) from None
+                await hand_over(busy.address, visit.url, form)
         elif "leave" in form and visit.step.data["partner"] == "human":
             await self._lobby.leave(visit)
 
     async def _out_of_time(self, visit: Visit, happening: Happening) -> None:
         if isinstance(happening, Ended) and visit.step.kind == "round":
-            await self._matches.give_up(visit)
+            with suppress(RoundBusy):  # whoever has the round watches the time too
+                await self._matches.give_up(visit)
             visit = await self._visits.find(visit.row.token) or visit
             happening = Ended(visit.step.id, happening.outcome)
         await self._visits.happened(visit, happening)

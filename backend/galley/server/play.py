@@ -13,6 +13,7 @@ from galley.server.journal import Handed
 from galley.server.match import LEFT, RESTART
 from galley.server.matches import Matches, Place, RoundBusy
 from galley.server.origin import same_origin
+from galley.server.relay import RELAYED, pass_on
 from galley.server.visits import Visits
 
 LOG = logging.getLogger(__name__)
@@ -97,6 +98,11 @@ class Pace:
         self._at_s = now_s
         return max(0.0, -self._left / self._per_s)
 
+    async def wait(self) -> None:
+        """Return when the next message may be taken."""
+        if wait_s := self.wait_s(asyncio.get_running_loop().time()):
+            await asyncio.sleep(wait_s)
+
 
 class Play:
     """The endpoint of all play sockets."""
@@ -141,13 +147,21 @@ class Play:
             arrival_s = loop.time()
             try:
                 text = event.get("text")
-                message = wire.parse(event.get("bytes") or b"" if text is None else text)
+                frame = event.get("bytes") or b"" if text is None else text
+                message = wire.parse(frame)
                 if isinstance(message, wire.Key | wire.Release):
                     if message.seq <= last_seq:
                         raise wire.MessageError(f"seq {message.seq} does not come after {last_seq}")
                     last_seq = message.seq
                 if isinstance(message, wire.Hello):
-                    if not await self._hello(socket, token, message):
+                    busy = await self._hello(socket, token, message)
+                    if busy is not None and busy.address and RELAYED not in websocket.headers:
+                        path = websocket.url.path
+                        code = await pass_on(websocket, busy.address, path, frame, pace.wait)
+                        socket.close(code)
+                    elif busy is not None:
+                        socket.close(wire.CLOSE_BUSY)
+                    if socket.place is None:
                         return LEFT
                 elif socket.place is None:
                     raise wire.MessageError("the first message is hello")
@@ -155,11 +169,13 @@ class Play:
                     _pass_on(socket.place, socket, message, arrival_s)
             except wire.MessageError as error:
                 socket.send(wire.encode("refused", reason=str(error)))
-            if wait_s := pace.wait_s(arrival_s):
-                await asyncio.sleep(wait_s)
+            await pace.wait()
 
-    async def _hello(self, socket: Socket, token: str, hello: wire.Hello) -> bool:
-        """Whether the connection goes on. Raises: MessageError for a second hello."""
+    async def _hello(self, socket: Socket, token: str, hello: wire.Hello) -> RoundBusy | None:
+        """Give the socket its place, or close it, or say that another process has the round.
+
+        Raises: MessageError for a second hello.
+        """
         if socket.place is not None:
             raise wire.MessageError("hello was said already")
         if hello.protocol != wire.PROTOCOL:
@@ -167,20 +183,19 @@ class Play:
                 wire.encode("refused", reason=f"the protocol is {wire.PROTOCOL}; load the page again")
             )
             socket.close(wire.CLOSE_REFUSED)
-            return False
+            return None
         visit = await self._visits.find(token)
         try:
             place = None if visit is None else await self._matches.of(visit)
-        except RoundBusy:
-            socket.close(wire.CLOSE_BUSY)
-            return False
+        except RoundBusy as busy:
+            return busy
         if place is None:
             socket.close(wire.CLOSE_ENDED)
-            return False
+            return None
         socket.tab = hello.tab
         socket.place = place
         place.match.join(place.person, socket)
-        return True
+        return None
 
 
 def _pass_on(place: Place, socket: Socket, message: wire.Incoming, arrival_s: float) -> None:

@@ -10,6 +10,7 @@ import tempfile
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import uvicorn
 from fastapi import FastAPI
@@ -73,7 +74,10 @@ def _serve(workspace: Workspace, settings: Settings, database: str, *, preview: 
     listening = listen(settings)
     try:
         with Store.open(database, serving=True) as store:
-            app = create_app(workspace, store, settings, preview=preview)
+            known = replace(
+                settings, reached_at=settings.reached_at or reached_at(listening, store.engine.url)
+            )
+            app = create_app(workspace, store, known, preview=preview)
             # A thread that wants the interpreter gets it sooner: a tick waits less for an agent that thinks
             # in Python.
             sys.setswitchinterval(SWITCH_INTERVAL_S)
@@ -123,6 +127,30 @@ class Announcing(uvicorn.Server):
             shown = f"[{reached}]" if ":" in reached else reached
             sys.stdout.write(f"http://{shown}:{self._port}\n")
             sys.stdout.flush()
+
+
+def reached_at(listening: socket.socket, database: Any) -> str:
+    """HOST:PORT at which other processes on the same database reach this one; "" if there are none.
+
+    `database` is its URL. Who listens on every address is reached at the one that leads to the database.
+    """
+    if database.get_backend_name() == "sqlite":
+        return ""
+    host, port = listening.getsockname()[:2]
+    if host in ("0.0.0.0", "::"):  # noqa: S104
+        host = _own_address(database.host or "127.0.0.1", database.port or 5432)
+    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+
+
+def _own_address(other: str, port: int) -> str:
+    """This machine's address on the way to another host; no packet is sent."""
+    try:
+        family, kind, proto, _, there = socket.getaddrinfo(other, port, type=socket.SOCK_DGRAM)[0]
+        with socket.socket(family, kind, proto) as probe:
+            probe.connect(there)
+            return str(probe.getsockname()[0])
+    except OSError:
+        return "127.0.0.1"
 
 
 def listen(settings: Settings) -> socket.socket:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
@@ -24,6 +25,11 @@ SETTINGS: tuple[Setting, ...] = (
     Setting("host", "HOST", "Address to listen on; 0.0.0.0 lets other machines in."),
     Setting("port", "PORT", "Port to listen on; 0 takes any free one.", 0, 65535),
     Setting("database", "DATABASE", "Database URL; empty means SQLite in the workspace."),
+    Setting(
+        "reached_at",
+        "REACHED_AT",
+        "HOST:PORT at which other replicas reach this one; empty finds it out. SQLite needs none.",
+    ),
     Setting("study", "STUDY", "The one study to serve; empty serves all of the workspace."),
     Setting(
         "think_window_ms",
@@ -42,6 +48,7 @@ SETTINGS: tuple[Setting, ...] = (
     ),
     Setting("log_level", "LOG_LEVEL", "How much is logged: error, warning, info or debug."),
 )
+REACHED_AT = re.compile(r"([A-Za-z0-9._-]+|\[[0-9A-Fa-f:.]+\]):[0-9]{1,5}")
 LOG_LEVELS = ("error", "warning", "info", "debug")
 
 
@@ -52,6 +59,7 @@ class Settings:
     host: str = "127.0.0.1"
     port: int = 8000
     database: str = ""
+    reached_at: str = ""
     study: str = ""
     think_window_ms: int = 1
     max_form_kib: int = 256
@@ -82,6 +90,8 @@ def _checked(setting: Setting, origin: str, value: Any) -> str | int:
     if setting.low is None or setting.high is None:
         if setting.name == "log_level" and value not in LOG_LEVELS:
             raise GalleyError(f"{origin}: '{value}' is no log level; use one of {', '.join(LOG_LEVELS)}")
+        if setting.name == "reached_at" and not REACHED_AT.fullmatch(str(value)):
+            raise GalleyError(f"{origin}: '{value}' is no address; write HOST:PORT, such as 10.0.0.7:8000")
         return str(value)
     try:
         number = int(value)
