@@ -31,11 +31,12 @@ function leave(form) {
   form.submit();
 }
 
-const limit = document.querySelector(".limit");
-if (limit instanceof HTMLElement) {
+for (const limit of document.querySelectorAll(".limit")) {
+  if (!(limit instanceof HTMLElement)) continue;
   countDown(Number(limit.dataset.left), (left) => {
+    limit.hidden = left > Number(limit.dataset.from ?? Infinity);
     limit.textContent = fill(limit.dataset.words ?? "{time}", { time: clock(left) });
-    if (left === 0) leave(document.querySelector("main form"));
+    if (left === 0) leave(document.querySelector("main form:not(.leave)"));
   });
 }
 

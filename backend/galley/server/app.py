@@ -31,6 +31,7 @@ from galley.server.play import Play
 from galley.server.setting_up import round_layout
 from galley.server.settings import Settings
 from galley.server.thinking import Thinking
+from galley.server.time_limits import TimeLimits
 from galley.server.visits import Visits
 from galley.study.assignment import cells
 from galley.study.plan import plan_visit, visit_seed
@@ -87,15 +88,19 @@ def create_app(workspace: Workspace, store: Store, settings: Settings, *, previe
     )
     play = Play(visits, matches, settings.messages_per_s)
 
+    time_limits = TimeLimits(store, studies, visits, matches, clock)
+
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
         thinking.start()
         # What is here now stays: the collector need not walk it again in the middle of a tick.
         gc.collect()
         gc.freeze()
+        watching = asyncio.create_task(time_limits.watch())
         try:
             yield
         finally:
+            watching.cancel()
             await matches.stop()
             await asyncio.wrap_future(store.flush())
             thinking.stop()

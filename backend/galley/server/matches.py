@@ -122,6 +122,16 @@ class Matches:
                 there = await self._take_up(visit, row.id)
         return there
 
+    @property
+    def owner(self) -> str:
+        """The name under which this process leases rounds."""
+        return self._owner
+
+    def in_play(self, visit: Visit) -> bool:
+        """Whether a visit's round runs here just now, with everybody there."""
+        place = self._place(visit)
+        return place is not None and place.match.phase in ("countdown", "playing")
+
     async def begun(self, visit: Visit) -> bool:
         """Whether the round that a visit is at was set up."""
         return self._place(visit) is not None or await self._glance(visit) is not None

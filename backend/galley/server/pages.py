@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from typing import Any
 from urllib.parse import urlencode
 
@@ -28,6 +27,7 @@ from galley.server.step_pages import (
     step_context,
 )
 from galley.server.templates import templates as templates
+from galley.server.time_limits import time_is_up
 from galley.server.visits import GRACE_S, Visit, Visits
 from galley.study.languages import choose_language
 from galley.study.plan import Step
@@ -35,11 +35,9 @@ from galley.study.progress import (
     Agreed,
     Continued,
     Declined,
-    Ended,
     Happening,
     Skipped,
     Submitted,
-    TimedOut,
 )
 from galley.study.questionnaire import validate_answers
 from galley.study.study import Study
@@ -172,7 +170,7 @@ class Pages:
             return self.plain(404, UNKNOWN, UNKNOWN_LINK)
         overdue = self._visits.overdue(visit)
         if overdue is not None:
-            await self._out_of_time(visit, overdue)
+            await time_is_up(self._visits, self._matches, visit, overdue)
             visit = await self._visits.find(token) or visit
         if visit.progress.status not in ("active", "completed"):
             return self._page("ending.html", **ending_context(visit))
@@ -215,7 +213,7 @@ class Pages:
             return on
         overdue = self._visits.overdue(visit, GRACE_S)
         if overdue is not None:
-            await self._out_of_time(visit, overdue)
+            await time_is_up(self._visits, self._matches, visit, overdue)
         elif step.kind == "round":
             await self._round_form(visit, form, relayed=RELAYED in request.headers)
         elif "skip" in form and step.skippable:
@@ -232,11 +230,11 @@ class Pages:
         problems: Mapping[str, str] = {}
         if questionnaire is not None:
             answers, problems = validate_answers(questionnaire, form, self._visits.say(visit.row.language))
-        left_s = visit.seconds_left(self._clock.ms())
-        if problems and "time_up" in form and left_s is not None and left_s < GRACE_S:
-            await self._visits.happened(visit, TimedOut(step.id))
-            return None
         # A page that counts the seconds itself may be a little ahead of this clock.
+        soon = self._visits.overdue(visit, -GRACE_S)
+        if problems and "time_up" in form and soon is not None:
+            await time_is_up(self._visits, self._matches, visit, soon)
+            return None
         early = visit.wait_s(self._clock.ms()) > 1.0 and step.kind != "consent"
         if problems or early:
             return self._step_page(visit, 422, form, problems, early=early)
@@ -255,14 +253,6 @@ class Pages:
                 await hand_over(busy.address, visit.url, form)
         elif "leave" in form and visit.step.data["partner"] == "human":
             await self._lobby.leave(visit)
-
-    async def _out_of_time(self, visit: Visit, happening: Happening) -> None:
-        if isinstance(happening, Ended) and visit.step.kind == "round":
-            with suppress(RoundBusy):  # whoever has the round watches the time too
-                await self._matches.give_up(visit)
-            visit = await self._visits.find(visit.row.token) or visit
-            happening = Ended(visit.step.id, happening.outcome)
-        await self._visits.happened(visit, happening)
 
     # ---- rendering -----------------------------------------------------------------------------------------
 

@@ -47,6 +47,7 @@ def common_context(visit: Visit, now_ms: float) -> dict[str, Any]:
     """What every page of a visit is given."""
     at, of = visit.position
     left_s = visit.seconds_left(now_ms)
+    whole_s = visit.visit_seconds_left(now_ms) if visit.active else None
     return {
         "step": public_step(visit.step),
         "study": public_study(visit.study),
@@ -55,6 +56,7 @@ def common_context(visit: Visit, now_ms: float) -> dict[str, Any]:
         "language": visit.row.language,
         "test": visit.row.test,
         "seconds_left": None if left_s is None else max(0, math.ceil(left_s)),
+        "visit_seconds_left": None if whole_s is None else max(0, math.ceil(whole_s)),
         "wait_s": math.ceil(visit.wait_s(now_ms)),
         "skippable": visit.step.skippable,
     }

@@ -79,6 +79,11 @@ class Visit:
         limit = self.step.time_limit_s
         return None if limit is None else limit - self.spent_s(now_ms)
 
+    def visit_seconds_left(self, now_ms: float) -> float | None:
+        """What is left of the visit's time; None without a limit."""
+        limit = self.study.config.visit_limit_min
+        return None if limit is None else limit * 60.0 - (now_ms - self.row.created_ms) / 1000.0
+
     def wait_s(self, now_ms: float) -> float:
         """How long the participant has to stay at the step; 0 once they may go on."""
         return max(0.0, self.step.at_least_s - self.spent_s(now_ms))
@@ -198,12 +203,12 @@ class Visits:
         await asyncio.wrap_future(self._store.enter_step(visit.row.id, visit.step.id, self._clock.ms()))
 
     def overdue(self, visit: Visit, grace_s: float = 0.0) -> Happening | None:
-        """What the passing of time does to a visit now; None while no limit has passed."""
+        """What the passing of time does to a visit, or did `grace_s` ago; None while no limit has passed."""
         if not visit.active:
             return None
         now_ms = self._clock.ms() - grace_s * 1000.0
-        limit = visit.study.config.visit_limit_min
-        if limit is not None and now_ms >= visit.row.created_ms + limit * 60_000:
+        whole_s = visit.visit_seconds_left(now_ms)
+        if whole_s is not None and whole_s <= 0:
             return Ended(visit.step.id, "timed_out")
         left_s = visit.seconds_left(now_ms)
         return TimedOut(visit.step.id) if left_s is not None and left_s <= 0 else None

@@ -71,7 +71,7 @@ class StudyFile(FileModel):
     abandon_after_s: Annotated[int, Field(ge=1, le=3600)] = 60
     """Seconds after which a round that its participant left ends as abandoned."""
     visit_limit_min: int | None = Field(None, ge=1, le=10_000)
-    """Minutes after which a visit ends as timed_out."""
+    """Minutes after which a visit ends as timed_out, wherever it is; a round in play is played to its end."""
     hats: tuple[Hat, ...] = HATS
     """The hat colours to give out."""
     hat_order: Order = "random"
