@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from galley.agents.bundle import Bundle
-from galley.agents.together import act_together
+from galley.agents.crew import crew
 from galley.kitchen import KitchenBatch, Layout
 
 
@@ -53,21 +53,14 @@ def play(a: Bundle, b: Bundle, layout: Layout, games: int, seed: int) -> tuple[P
 def play_in_seats(seats: tuple[Bundle, Bundle], layout: Layout, seeds: Sequence[int]) -> PlayResult:
     """The result of one game per seed, all played side by side to their ends."""
     kitchens = KitchenBatch(layout, len(seeds))
-    agents = [(seats[0].make(), seats[1].make()) for _ in seeds]
-    for pair, seed in zip(agents, seeds, strict=True):
-        for seat, agent in enumerate(pair):
-            agent.reset(layout, seat, seed)
-    everyone = [agent for pair in agents for agent in pair]
+    crews = [crew(bundle, layout, seat, seeds) for seat, bundle in enumerate(seats)]
     scores = np.zeros(len(seeds), dtype=np.int64)
     tick = 0
     while not kitchens.done.all():
         states = kitchens.states.copy()
-        rows = [state for state in states for _ in range(2)]
-        actions = np.array(act_together(everyone, rows, [tick] * len(rows)), dtype=np.uint8).reshape(-1, 2)
-        for agent, state, joint in zip(
-            everyone, rows, [(int(one), int(other)) for one, other in actions for _ in range(2)], strict=True
-        ):
-            agent.observe(state, joint)
+        actions = np.stack([agents.act(states, tick) for agents in crews], axis=1)
+        for agents in crews:
+            agents.observe(states, actions)
         scores += kitchens.step(actions)
         tick += 1
     return PlayResult(seats[0].name, seats[1].name, layout.name, tuple(scores.tolist()))
