@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import logging
+import functools
 from collections.abc import Callable, Sequence
 from typing import Any
 
 from galley.analysis.evaluate import Team, evaluate
-from galley.errors import GalleyError
 from galley.kitchen.layout import Layout
+from galley.workers import map_tasks
 
 
 def evaluate_many(
@@ -26,41 +26,16 @@ def evaluate_many(
     Raises:
         GalleyError: as `evaluate`; Dask is not installed; the scheduler does not answer.
     """
-    if scheduler is None and workers <= 1:
-        found = []
-        for number, layout in enumerate(layouts, start=1):
-            found.append(evaluate(layout, team))
-            if on_done is not None:
-                on_done(number)
-        return found
-    try:
-        from distributed import Client, LocalCluster, as_completed
-    except ImportError:
-        raise GalleyError(
-            "several workers need Dask; install it with: pip install 'galley[evaluate]'"
-        ) from None
-    cluster = None
-    if scheduler is None:
-        cluster = LocalCluster(
-            n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs=logging.ERROR
-        )
-    try:
-        client = Client(cluster if cluster is not None else scheduler, timeout="10s")
-    except (OSError, ValueError) as error:
-        raise GalleyError(
-            f"the scheduler {scheduler} does not answer ({error}); start it with: dask scheduler"
-        ) from None
-    try:
-        futures = client.map(_from_dict, [layout.to_dict() for layout in layouts], team=team, pure=False)
-        for number, _ in enumerate(as_completed(futures), start=1):
-            if on_done is not None:
-                on_done(number)
-        answers: list[dict[str, Any]] = client.gather(futures)
-        return answers
-    finally:
-        client.close()
-        if cluster is not None:
-            cluster.close()
+    done = 0
+
+    def count(place: int, answer: dict[str, Any]) -> None:
+        nonlocal done
+        done += 1
+        if on_done is not None:
+            on_done(done)
+
+    tasks = [layout.to_dict() for layout in layouts]
+    return map_tasks(functools.partial(_from_dict, team=team), tasks, workers, scheduler, count)
 
 
 def _from_dict(layout: dict[str, Any], team: Team) -> dict[str, Any]:
