@@ -9,10 +9,12 @@ from typing import Annotated
 
 import typer
 
+from galley.commands import learn_evaluate
 from galley.commands.options import WorkspaceOption
 from galley.errors import GalleyError
 
 app = typer.Typer(help="Make agents (needs PyTorch: pip install 'galley[learn]').", no_args_is_help=True)
+app.command()(learn_evaluate.evaluate)
 
 
 class Split(StrEnum):
