@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import random
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from galley.records import Store
+from galley.records import Store, queries
 from galley.study.assignment import cells
+from galley.study.plan import Plan
 from galley.study.study import Study, load_study
 from tests.faults.balance import Recruiting, counted
+from tests.study.test_design import combination
 from tests.study.workspaces import study_workspace
 
 ARRIVALS = 1000
@@ -30,6 +33,29 @@ stages:
   - kind: rounds
     agents: [$partner]
     layouts: [{layout: $kitchen}]
+  - {kind: debrief, text: debrief}
+"""
+
+
+TOGETHER = """
+format: 1
+title: Every combination
+seed: 19
+slot_expires_min: 45
+completion: {code: ALL-1}
+factors:
+  baseline: {levels: [random, stay]}
+quota: 24
+hats: [orange, sky-blue, bluish-green]
+hat_order: full
+together: [agent_order, seat_order, hat_order]
+stages:
+  - {kind: consent, text: consent}
+  - kind: rounds
+    agents: [myopic, $baseline]
+    agent_order: full
+    seat_order: full
+    layouts: [{layout: cramped_room}]
   - {kind: debrief, text: debrief}
 """
 
@@ -76,3 +102,19 @@ def test_with_a_quota_every_cell_closes_with_exactly_that_many(store: Store, tmp
     assert recruiting.why["later"] > 0, "places were all taken for a while"
     assert recruiting.why["full"] > 0, "and closed at the end"
     assert list(store.read(counted).result().values()) == [(0, QUOTA)] * 6
+
+
+def test_completed_visits_have_every_combination_of_agent_order_seat_and_hats_equally_often(
+    store: Store, tmp_path: Path
+) -> None:
+    design = load_study(study_workspace(tmp_path / "lab", TOGETHER, "cells"), "cells")
+    recruiting = Recruiting(store, design, random.Random(5))
+    for _ in recruiting.events(400):
+        pass
+    assert recruiting.why["full"] > 0
+    assert sum(recruiting.left[how] for how in ("silent", "declined", "failed_checks")) > 10
+    with store.reading() as connection:
+        done = [row for row in queries.visits(connection, "cells") if row.status == "completed"]
+    seen = Counter(combination(Plan.from_json(row.plan_json)) for row in done)
+    assert len(seen) == 2 * 2 * 2 * 6
+    assert set(seen.values()) == {1}

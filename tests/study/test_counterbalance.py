@@ -1,7 +1,8 @@
 from __future__ import annotations
 
+import math
 from collections import Counter
-from itertools import pairwise, permutations
+from itertools import pairwise, permutations, product
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from galley.study.counterbalance import (
+    Turn,
     bits,
     in_blocks,
     latin_square,
@@ -18,6 +20,7 @@ from galley.study.counterbalance import (
     picks,
     sequences,
     spread,
+    together,
 )
 
 DRAW = np.random.default_rng(0)
@@ -67,48 +70,73 @@ def test_permutations_are_all_of_them_once() -> None:
 def test_full_counterbalancing_gives_out_every_sequence_of_orders() -> None:
     count = sequences("full", 3, 2)
     assert count == 36
-    seen = {orders("full", 3, 2, DRAW, 1, TAG, number) for number in range(count)}
+    seen = {orders("full", 3, 2, DRAW, Turn(1, TAG, number)) for number in range(count)}
     assert len(seen) == 36
-    seats = {bits("full", 3, DRAW, 1, TAG, number) for number in range(8)}
+    seats = {bits("full", 3, DRAW, Turn(1, TAG, number)) for number in range(8)}
     assert len(seats) == 8
 
 
 def test_latin_squares_give_every_unit_the_next_row() -> None:
     rows = latin_square(4)
     for number in range(8):
-        inside = orders("latin_square", 4, 3, DRAW, 1, TAG, number)
+        inside = orders("latin_square", 4, 3, DRAW, Turn(1, TAG, number))
         first = rows.index(inside[0])
         assert inside == tuple(rows[(first + unit) % 4] for unit in range(3))
-    assert {orders("latin_square", 4, 1, DRAW, 1, TAG, number)[0] for number in range(4)} == set(rows)
+    assert {orders("latin_square", 4, 1, DRAW, Turn(1, TAG, number))[0] for number in range(4)} == set(rows)
 
 
 def test_seats_by_latin_square_take_turns_from_either() -> None:
-    assert {bits("latin_square", 4, DRAW, 1, TAG, number) for number in range(2)} == {
+    assert {bits("latin_square", 4, DRAW, Turn(1, TAG, number)) for number in range(2)} == {
         (0, 1, 0, 1),
         (1, 0, 1, 0),
     }
-    assert bits("fixed", 3, DRAW, 1, TAG, 5) == (0, 1, 0)
+    assert bits("fixed", 3, DRAW, Turn(1, TAG, 5)) == (0, 1, 0)
 
 
 def test_every_hat_is_equally_often_in_every_role() -> None:
-    rows = [picks("latin_square", 7, 3, DRAW, 1, TAG, number) for number in range(14)]
+    rows = [picks("latin_square", 7, 3, DRAW, Turn(1, TAG, number)) for number in range(14)]
     for role in range(3):
         assert set(Counter(row[role] for row in rows).values()) == {2}
-    everything = [picks("full", 4, 2, DRAW, 1, TAG, number) for number in range(12)]
+    everything = [picks("full", 4, 2, DRAW, Turn(1, TAG, number)) for number in range(12)]
     assert set(everything) == set(permutations(range(4), 2))
-    assert picks("fixed", 7, 3, DRAW, 1, TAG, 9) == (0, 1, 2)
+    assert picks("fixed", 7, 3, DRAW, Turn(1, TAG, 9)) == (0, 1, 2)
 
 
 @pytest.mark.parametrize("mode", ["fixed", "random", "latin_square", "full"])
 def test_places_are_shared_out_evenly(mode: str) -> None:
     for number in range(12):
-        laid = spread(mode, 3, 7, DRAW, 1, TAG, number)  # type: ignore[arg-type]
+        laid = spread(mode, 3, 7, DRAW, Turn(1, TAG, number))  # type: ignore[arg-type]
         counts = Counter(laid)
         assert sorted(counts.values()) == [2, 2, 3]
 
 
 def test_every_thing_comes_to_every_place_equally_often() -> None:
     for mode, size in (("latin_square", 3), ("full", 6)):
-        laid = [spread(mode, 3, 3, DRAW, 1, TAG, number) for number in range(size)]  # type: ignore[arg-type]
+        laid = [spread(mode, 3, 3, DRAW, Turn(1, TAG, number)) for number in range(size)]  # type: ignore[arg-type]
         for place in range(3):
             assert set(Counter(one[place] for one in laid).values()) == {size // 3}
+
+
+@given(
+    seed=st.integers(0, 2**63 - 1),
+    sizes=st.lists(st.integers(1, 6), min_size=1, max_size=4),
+    block=st.integers(0, 3),
+)
+def test_orders_counted_together_give_every_combination_once_in_a_block(
+    seed: int, sizes: list[int], block: int
+) -> None:
+    whole, run = math.prod(sizes), math.lcm(*sizes)
+    given_out = [together(seed, TAG, block * whole + n, sizes) for n in range(whole)]
+    assert sorted(given_out) == list(product(*map(range, sizes)))
+    for begin in range(0, whole, run):
+        for place, size in enumerate(sizes):
+            counts = Counter(one[place] for one in given_out[begin : begin + run])
+            assert counts == dict.fromkeys(range(size), run // size), "even in every run"
+
+
+def test_blocks_of_combinations_are_shuffled_each_on_its_own() -> None:
+    sizes = [2, 2, 3]
+    blocks = {tuple(together(5, TAG, 12 * block + n, sizes) for n in range(12)) for block in range(30)}
+    assert len(blocks) > 10
+    first = Counter(together(5, TAG, 12 * block, sizes) for block in range(1200))
+    assert all(60 < first[one] < 140 for one in product(range(2), range(2), range(3)))

@@ -374,3 +374,88 @@ def test_designs_that_cannot_be_run_are_told(tmp_path: Path, stages: str, top: s
     assert words in told
     assert len(told.splitlines()) == 1
     assert told.startswith("studies/mine.yaml:")
+
+
+TOGETHER = """
+- kind: rounds
+  agents: [human-bc, $baseline]
+  agent_order: full
+  seat_order: full
+  layouts: [{layout: cramped_room}]
+"""
+CROSSED = """
+factors: {baseline: {levels: [myopic, random, stay]}}
+hats: [orange, sky-blue, bluish-green]
+hat_order: full
+together: [agent_order, seat_order, hat_order]
+"""
+
+
+def combination(plan: Plan) -> tuple[object, ...]:
+    """What a visit meets: the baseline, the order, the seat, every hat."""
+    baseline = plan.condition["baseline"]
+    first = met(plan, "agent")[0] == baseline
+    focal = next(hat for agent, hat in plan.hats.items() if agent != baseline)
+    hats = (rounds(plan)[0].data["human_hat"], focal, plan.hats[baseline])
+    return baseline, first, met(plan, "human_seat")[0], *hats
+
+
+def test_agent_order_seat_and_hat_are_even_in_every_combination(tmp_path: Path) -> None:
+    study = design(tmp_path, TOGETHER, CROSSED)
+    told = describe(study)
+    assert "agent_order (2) x seat_order (2) x hat_order (6) = 24 in each of 3 cells" in told
+    assert "even after each 24 completed visits of each cell" in told
+    given = plans(study, 2 * 3 * 24)
+    seen = Counter(map(combination, given))
+    assert len(seen) == 3 * 2 * 2 * 6
+    assert set(seen.values()) == {2}
+    # Six visits of a cell are a run: in each, orders, seats and hats are even by themselves already.
+    for run in range(0, len(given), 18):
+        for part in (1, 2):
+            assert set(Counter(combination(plan)[part] for plan in given[run : run + 18]).values()) == {9}
+        assert set(Counter(combination(plan)[3:] for plan in given[run : run + 18]).values()) == {3}
+
+
+def test_without_together_orders_are_even_only_by_themselves(tmp_path: Path) -> None:
+    study = design(tmp_path, TOGETHER, CROSSED.replace("together: [agent_order, seat_order, hat_order]", ""))
+    assert "together" not in describe(study)
+    seen = Counter(map(combination, plans(study, 2 * 3 * 24)))
+    assert set(seen.values()) != {2}
+
+
+def test_orders_of_several_stages_are_counted_together(tmp_path: Path) -> None:
+    stage = TOGETHER.strip().replace("$baseline", "myopic").replace("  seat_order: full\n", "")
+    study = design(tmp_path, f"{stage}\n{stage}", "together: [agent_order]")
+    assert "rounds.agent_order (2) x rounds-2.agent_order (2) = 4" in describe(study)
+    seen = Counter(met(plan, "agent") for plan in plans(study, 12))
+    assert sorted(seen.values()) == [3, 3, 3, 3]
+
+
+def test_a_quota_that_leaves_combinations_uneven_is_told(tmp_path: Path) -> None:
+    for number in (24, 30, 10):
+        (tmp_path / f"q{number}").mkdir()
+    for quota, told in ((24, None), (30, "24 or 48 would be"), (10, "24 would be")):
+        lines = describe(design(tmp_path / f"q{quota}", TOGETHER, f"{CROSSED}quota: {quota}"))
+        assert (f"quota of {quota} is no multiple of that" in lines) == (told is not None)
+        assert told is None or told in lines
+
+
+@pytest.mark.parametrize(
+    ("top", "stages", "told"),
+    [
+        ("together: [layout_order, seat_order]", TOGETHER, "nothing counts through 'layout_order'"),
+        ("together: [seat_order, hat_order]", TOGETHER, "nothing counts through 'hat_order'"),
+        ("together: [seat_order]", TOGETHER, "one order alone is not counted with another"),
+        ("together: [seat_order, seat_order]", TOGETHER, "order 'seat_order' stands twice"),
+        ("together: [order, seat_order]", TOGETHER, "together"),
+        (
+            "hat_order: full\ntogether: [seat_order, agent_order, hat_order]",
+            TOGETHER.replace("[{layout: cramped_room}]", LAYOUTS),
+            "these orders have 53760 combinations",
+        ),
+    ],
+)
+def test_what_cannot_be_counted_together_is_refused(tmp_path: Path, top: str, stages: str, told: str) -> None:
+    message = refused(tmp_path, stages.replace("$baseline", "random"), top)
+    assert told in message
+    assert "mine.yaml:" in message

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from itertools import product
+from math import prod
 from typing import Annotated, Any, Final, Literal, Self, get_args
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from galley.files import FileModel, Loc, faults
 from galley.names import name_fix
-from galley.study.factors import FACTOR_MARK, Factor, FactorName, Order, levels_of, resolve
+from galley.study.counterbalance import MOST_SEQUENCES, permutations_count, sequences
+from galley.study.factors import FACTOR_MARK, Counted, Factor, FactorName, Order, levels_of, resolve
 from galley.study.languages import LanguageCode, Text, Words
 from galley.study.recruitment import Attention, Completion, Endings, Recruitment, unknown_places
 from galley.study.stages import (
@@ -76,6 +78,8 @@ class StudyFile(FileModel):
     """The hat colours to give out."""
     hat_order: Order = "random"
     """How hats are given: see Balance."""
+    together: tuple[Counted, ...] = Field((), max_length=5)
+    """Orders that are counted through together, so that every combination of them comes equally often."""
     bonus_unit: Annotated[str, Field(max_length=20)] = ""
     """The unit of bonuses, such as CNY."""
     factors: dict[FactorName, Factor] = Field(default_factory=dict)
@@ -99,6 +103,11 @@ class StudyFile(FileModel):
     @classmethod
     def _hats_differ(cls, hats: tuple[Hat, ...]) -> tuple[Hat, ...]:
         return names_differ(hats, "hat")
+
+    @field_validator("together")
+    @classmethod
+    def _orders_differ(cls, together: tuple[Counted, ...]) -> tuple[Counted, ...]:
+        return names_differ(together, "order")
 
     @field_validator("languages")
     @classmethod
@@ -125,7 +134,7 @@ class StudyFile(FileModel):
     def _parts_fit_together(self, info: ValidationInfo) -> Self:
         found = [*self._factor_name_faults(info.context or {}), *self._redirect_faults()]
         if not found:
-            found = [*self._partner_faults(), *self._hat_faults()]
+            found = [*self._partner_faults(), *self._hat_faults(), *self._together_faults()]
         if found:
             raise faults(found)
         return self
@@ -134,6 +143,49 @@ class StudyFile(FileModel):
         """Every combination of the factors' levels."""
         levels = [factor.levels for factor in self.factors.values()]
         return tuple(dict(zip(self.factors, chosen, strict=True)) for chosen in product(*levels))
+
+    def counters(self, condition: Mapping[str, str]) -> dict[tuple[int, Counted], int]:
+        """How many treatments each order has that is counted through, by (place of its stage, key).
+
+        Hats belong to the whole study, so they have the place 0 of consent, which has no orders.
+        """
+        found: dict[tuple[int, Counted], int] = {}
+        for place, stage in enumerate(self.stages):
+            if isinstance(stage, Rounds):
+                found |= {(place, key): count for key, count in stage.needed().items()}
+        worn = self.hats_worn(condition)
+        hats = {"latin_square": sequences("latin_square", len(self.hats), 1)}
+        hats["full"] = permutations_count(len(self.hats), worn)
+        if hats.get(self.hat_order, 0) > 1:
+            found[0, "hat_order"] = hats[self.hat_order]
+        return found
+
+    def joined(self, condition: Mapping[str, str]) -> dict[tuple[int, Counted], int]:
+        """Those of the counters that are counted through together, as `together` names them."""
+        counters = self.counters(condition)
+        return {key: counters[key] for name in self.together for key in sorted(counters) if key[1] == name}
+
+    def hats_worn(self, condition: Mapping[str, str]) -> int:
+        """Hats for a participant, their partners and the tutorial's partner, as far as there are so many."""
+        return min(len(self.hats), len(played_agents(self.stages, condition)) + 2)
+
+    def _together_faults(self) -> Iterator[Fault]:
+        if not self.together:
+            return
+        condition = self.conditions()[0]
+        there = {key for _, key in self.counters(condition)}
+        for n, key in enumerate(self.together):
+            if key not in there:
+                where = "" if key == "hat_order" else "in a rounds stage, "
+                fix = f"write `{key}: latin_square` or `{key}: full` {where}or remove it here"
+                yield ("together", n), f"nothing counts through '{key}'", fix
+        if there.issuperset(self.together) and len(self.joined(condition)) < 2:
+            yield ("together",), "one order alone is not counted with another", "name two or more orders"
+        count = max(prod(self.joined(condition).values()) for condition in self.conditions())
+        if count > MOST_SEQUENCES:
+            told = f"these orders have {count} combinations, for so many participants in every cell"
+            fix = f"name fewer, or use latin_square instead of full (at most {MOST_SEQUENCES})"
+            yield ("together",), told, fix
 
     def _factor_name_faults(self, known: Mapping[str, tuple[str, ...]]) -> Iterator[Fault]:
         for kind, name, loc in named_in(self.stages):

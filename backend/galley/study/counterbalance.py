@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from math import factorial
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import factorial, gcd, lcm, prod
 from typing import Final
 
 from numpy.random import Generator, SeedSequence, default_rng
@@ -28,6 +30,46 @@ def in_blocks(seed: int, tag: Tag, number: int, size: int) -> int:
     # Visits' seeds come from spawn keys of length one, so these never meet them.
     shuffle = default_rng(SeedSequence(seed, spawn_key=(len(tag), *tag, block))).permutation(size)
     return int(shuffle[place])
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """Whose turn it is to get a treatment: the participant of this number, counted with that tag.
+
+    `given` is the treatment that several orders were counted through together for.
+    """
+
+    seed: int
+    tag: Tag
+    number: int
+    given: int | None = None
+
+    def of(self, size: int) -> int:
+        """Which of `size` treatments this participant gets, from 0."""
+        return in_blocks(self.seed, self.tag, self.number, size) if self.given is None else self.given
+
+
+def together(seed: int, tag: Tag, number: int, sizes: Sequence[int]) -> tuple[int, ...]:
+    """Which treatment of each of several orders, of `sizes` treatments, the participant of this number gets.
+
+    Every block of `prod(sizes)` participants in a row gets each combination once, and within a block every
+    run of `lcm(sizes)` holds each treatment of each order equally often: all orders take one step at a time
+    together, and each run begins elsewhere. Treatments' names and the order of runs are drawn for the block.
+    """
+    whole, run = prod(sizes), lcm(*sizes)
+    block, place = divmod(number, whole)
+    turn, step = divmod(place, run)
+    draw = default_rng(SeedSequence(seed, spawn_key=(len(tag), *tag, block)))
+    names = [draw.permutation(size) for size in sizes]
+    begins = int(draw.permutation(whole // run)[turn])
+    given = []
+    period = 1
+    for size, name in zip(sizes, names, strict=True):
+        # Orders so far repeat after `period` steps: this one may be shifted so far before that is the same.
+        begins, shift = divmod(begins, gcd(period, size))
+        given.append(int(name[(shift + step) % size]))
+        period = lcm(period, size)
+    return tuple(given)
 
 
 def latin_square(size: int) -> tuple[Permutation, ...]:
@@ -72,9 +114,7 @@ def sequences(mode: Order, size: int, units: int) -> int:
             return int(permutations_count(size) ** units)
 
 
-def orders(
-    mode: Order, size: int, units: int, draw: Generator, seed: int, tag: Tag, number: int
-) -> tuple[Permutation, ...]:
+def orders(mode: Order, size: int, units: int, draw: Generator, turn: Turn) -> tuple[Permutation, ...]:
     """An order of `size` things for each of `units`, for the participant of this number.
 
     `random` takes from `draw`; `latin_square` gives the participant a row and each unit the next one; `full`
@@ -87,15 +127,15 @@ def orders(
             return tuple(tuple(int(i) for i in draw.permutation(size)) for _ in range(units))
         case "latin_square":
             rows = latin_square(size)
-            row = in_blocks(seed, tag, number, len(rows))
+            row = turn.of(len(rows))
             return tuple(rows[(row + unit) % len(rows)] for unit in range(units))
         case "full":
             each = permutations_count(size)
-            place = in_blocks(seed, tag, number, each**units)
+            place = turn.of(each**units)
             return tuple(permutation_of(place // each**unit % each, size) for unit in range(units))
 
 
-def bits(mode: Order, units: int, draw: Generator, seed: int, tag: Tag, number: int) -> tuple[int, ...]:
+def bits(mode: Order, units: int, draw: Generator, turn: Turn) -> tuple[int, ...]:
     """0 or 1 for each of `units`; `fixed` takes turns from 0, `latin_square` takes turns from either."""
     match mode:
         case "fixed":
@@ -103,16 +143,14 @@ def bits(mode: Order, units: int, draw: Generator, seed: int, tag: Tag, number: 
         case "random":
             return tuple(int(bit) for bit in draw.integers(2, size=units))
         case "latin_square":
-            first = in_blocks(seed, tag, number, 2)
+            first = turn.of(2)
             return tuple((first + unit) % 2 for unit in range(units))
         case "full":
-            place = in_blocks(seed, tag, number, 2**units)
+            place = turn.of(2**units)
             return tuple(place >> unit & 1 for unit in range(units))
 
 
-def picks(
-    mode: Order, things: int, chosen: int, draw: Generator, seed: int, tag: Tag, number: int
-) -> Permutation:
+def picks(mode: Order, things: int, chosen: int, draw: Generator, turn: Turn) -> Permutation:
     """`chosen` different ones of `things`, each thing equally often in each role (`latin_square`, `full`)."""
     match mode:
         case "fixed":
@@ -120,16 +158,14 @@ def picks(
         case "random":
             return tuple(int(i) for i in draw.permutation(things)[:chosen])
         case "latin_square":
-            row = latin_square(things)[in_blocks(seed, tag, number, len(latin_square(things)))]
+            row = latin_square(things)[turn.of(len(latin_square(things)))]
             return row[:chosen]
         case "full":
             count = permutations_count(things, chosen)
-            return permutation_of(in_blocks(seed, tag, number, count), things, chosen)
+            return permutation_of(turn.of(count), things, chosen)
 
 
-def spread(
-    mode: Order, things: int, places: int, draw: Generator, seed: int, tag: Tag, number: int
-) -> tuple[int, ...]:
+def spread(mode: Order, things: int, places: int, draw: Generator, turn: Turn) -> tuple[int, ...]:
     """One of `things` for each of `places`, each thing as often as every other up to one."""
     laid = [place % things for place in range(places)]
     match mode:
@@ -139,8 +175,8 @@ def spread(
             drawn, where = draw.permutation(things), draw.permutation(places)
             return tuple(int(drawn[laid[place]]) for place in where)
         case "latin_square":
-            row = in_blocks(seed, tag, number, things)
+            row = turn.of(things)
             return tuple((one + row) % things for one in laid)
         case "full":
-            names = permutation_of(in_blocks(seed, tag, number, permutations_count(things)), things)
+            names = permutation_of(turn.of(permutations_count(things)), things)
             return tuple(names[one] for one in laid)

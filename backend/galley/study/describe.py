@@ -83,10 +83,15 @@ def _tail(study: Study) -> Iterator[str]:
         yield f"     closes after {config.quota} completed visits{each}" + (
             f", {total} in all" if len(full) > 1 else ""
         )
+    yield from _together(study)
     balanced = participants_to_balance(study)
     if balanced > 1:
         each = " of each cell" if len(full) > 1 else ""
         yield f"     every order that is counted through is even after each {balanced} completed visits{each}"
+        if config.quota is not None and config.quota % balanced:
+            below, above = (config.quota // balanced * balanced + more for more in (0, balanced))
+            fits = f"{below} or {above}" if below else str(above)
+            yield f"     the quota of {config.quota} is no multiple of that, {fits} would be"
     if config.visit_limit_min is not None:
         yield f"     a visit ends after {config.visit_limit_min} min"
     if config.recruitment.invitations is not None:
@@ -98,14 +103,30 @@ def _tail(study: Study) -> Iterator[str]:
             yield f"     code when {outcome.replace('_', ' ')}: {code}"
 
 
+def _together(study: Study) -> Iterator[str]:
+    """The orders that are counted through together, and how many combinations they have."""
+    config = study.config
+    joined = config.joined(cells(config)[0])
+    if not joined:
+        return
+    ids = stage_ids(config.stages)
+    several = sum(isinstance(stage, Rounds) for stage in config.stages) > 1
+    told = [
+        f"{f'{ids[place]}.' if several and key != 'hat_order' else ''}{key} ({count})"
+        for (place, key), count in joined.items()
+    ]
+    each = f" in each of {len(cells(config))} cells" if len(cells(config)) > 1 else ""
+    count = math.prod(joined.values())
+    yield f"     together, every combination equally often: {' x '.join(told)} = {count}{each}"
+
+
 def participants_to_balance(study: Study) -> int:
     """After how many completed visits of a cell all Latin squares and full orders are even at once."""
-    counts = [count for s in study.config.stages if isinstance(s, Rounds) for count in s.needed().values()]
-    if study.config.hat_order == "latin_square":
-        counts.append(len(latin_square(len(study.config.hats))))
-    if study.config.hat_order == "full":
-        worn = min(len(study.config.hats), len(study.agents) + 2)
-        counts.append(permutations_count(len(study.config.hats), worn))
+    counts = [1]
+    for condition in study.config.conditions():
+        joined = study.config.joined(condition)
+        counters = study.config.counters(condition).items()
+        counts += [math.prod(joined.values()), *(count for key, count in counters if key not in joined)]
     return math.lcm(*counts)
 
 

@@ -24,6 +24,8 @@ FACTOR_MARK: Final = "$"
 FactorName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=40)]
 Level = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=80)]
 Order = Literal["random", "fixed", "latin_square", "full"]
+Counted = Literal["layout_order", "agent_order", "pairs", "seat_order", "hat_order"]
+"""What a study may count through."""
 
 
 def known_name(what: str, kind: str, *besides: str) -> Any:

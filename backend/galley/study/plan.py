@@ -10,8 +10,8 @@ from numpy.random import Generator, SeedSequence, default_rng
 
 from galley.study.assignment import cell_number, cell_of_slot, place_in_cell
 from galley.study.config import ALONE_AGENT, played_agents
-from galley.study.counterbalance import Tag, bits, orders, picks, spread
-from galley.study.factors import resolve
+from galley.study.counterbalance import Turn, bits, orders, picks, spread, together
+from galley.study.factors import Counted, resolve
 from galley.study.languages import Words
 from galley.study.questionnaire import Questionnaire, Say
 from galley.study.stages import (
@@ -41,6 +41,14 @@ __all__ = ["STEP_KINDS", "Plan", "Step", "StepKind", "plan_visit", "visit_seed"]
 DESIGN: Final = 3
 HATS, LAYOUTS, AGENTS, SEATS, PAIRS, FIRST, ITEMS = range(7)
 """What is drawn or counted through in a stage; every one has a stream of its own."""
+JOINED: Final = 0
+KEYS: Final[Mapping[Counted, int]] = {
+    "layout_order": LAYOUTS,
+    "agent_order": AGENTS,
+    "pairs": PAIRS,
+    "seat_order": SEATS,
+    "hat_order": HATS,
+}
 
 
 def visit_seed(study: Study, visit_no: int) -> int:
@@ -79,8 +87,12 @@ class _Draft:
         self.round_no = 0
         self.seeds_drawn = 0
         self.pages = 0
+        joined = self.config.joined(self.condition)
+        tag = (DESIGN, self.cell, JOINED)
+        given = together(self.config.seed, tag, self.number, tuple(joined.values()))
+        self.given = {(place, KEYS[key]): one for (place, key), one in zip(joined, given, strict=True)}
         agents = played_agents(self.config.stages, self.condition)
-        wanted = min(len(self.config.hats), len(agents) + 2)
+        wanted = self.config.hats_worn(self.condition)
         chosen = picks(self.config.hat_order, len(self.config.hats), wanted, *self._by(0, HATS))
         hats = [str(self.config.hats[place]) for place in chosen]
         self.human_hat = hats[0]
@@ -108,10 +120,11 @@ class _Draft:
             self.config.attention.model_dump(),
         )
 
-    def _by(self, stage: int, what: int) -> tuple[Generator, int, Tag, int]:
+    def _by(self, stage: int, what: int) -> tuple[Generator, Turn]:
         """What an order is drawn with, and what it is counted through with."""
         draw = default_rng(SeedSequence(self.seed, spawn_key=(0, stage, what)))
-        return draw, self.config.seed, (DESIGN, self.cell, stage, what), self.number
+        tag = (DESIGN, self.cell, stage, what)
+        return draw, Turn(self.config.seed, tag, self.number, self.given.get((stage, what)))
 
     def _meets(self, stage: Stage) -> bool:
         asked = (condition for condition in conditions_of(stage) if condition.factor is not None)

@@ -12,6 +12,7 @@ from galley.study.counterbalance import MOST_SEQUENCES, permutations_count, sequ
 from galley.study.factors import (
     Condition,
     Conditions,
+    Counted,
     LayoutName,
     Order,
     PartnerName,
@@ -253,12 +254,14 @@ class Rounds(_Stage):
         """How many rounds a visit plays in this stage."""
         return len(self.layouts) * (len(self.agents) if self.pairs == "all" else 1)
 
-    def needed(self) -> dict[str, int]:
+    def needed(self) -> dict[Counted, int]:
         """How many participants of a cell balance each order that is counted through, by its key."""
         layouts, agents = len(self.layouts), len(self.agents)
         by_agent = self.blocks == "agent"
         units = self.count if self.seats == "per_round" else layouts
-        counts = {"layout_order": sequences(self.layout_order, layouts, agents if by_agent else 1)}
+        counts: dict[Counted, int] = {
+            "layout_order": sequences(self.layout_order, layouts, agents if by_agent else 1)
+        }
         if self.pairs == "all":
             counts["agent_order"] = sequences(self.agent_order, agents, 1 if by_agent else layouts)
         else:
