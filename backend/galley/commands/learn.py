@@ -9,12 +9,14 @@ from typing import Annotated
 
 import typer
 
-from galley.commands import learn_evaluate
+from galley.commands import learn_evaluate, learn_plot, learn_train
 from galley.commands.options import WorkspaceOption
 from galley.errors import GalleyError
 
 app = typer.Typer(help="Make agents (needs PyTorch: pip install 'galley[learn]').", no_args_is_help=True)
+app.command()(learn_train.train)
 app.command()(learn_evaluate.evaluate)
+app.add_typer(learn_plot.app, name="plot")
 
 
 class Split(StrEnum):

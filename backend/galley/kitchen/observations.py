@@ -72,6 +72,13 @@ class Encoder:
         if name != "overcooked-2019-features":
             self._static = np.ascontiguousarray(self._static).reshape(-1)
 
+    @property
+    def map(self) -> NDArray[np.uint8]:
+        """uint8 [*shape]: what an observation shows of the layout itself, in every state; zeros elsewhere."""
+        if self.name == "overcooked-2019-features":
+            return np.zeros(self.shape, dtype=np.uint8)
+        return self._static.reshape(self.shape).copy()
+
     def both(self, states: NDArray[np.int16], out: NDArray[Any] | None = None) -> NDArray[Any]:
         """[B,2,*shape]: what seat 0 and seat 1 see in `states` int16[B,S]; written into `out` if given."""
         return self._encode(states, _BOTH, (len(states), 2, *self.shape), out)
@@ -81,7 +88,7 @@ class Encoder:
     ) -> NDArray[Any]:
         """[B,*shape]: what one seat of each kitchen sees; `seats` is one seat or integer[B]."""
         chosen = np.asarray(seats, dtype=np.int64).reshape(-1, 1)
-        if chosen.size not in (1, len(states)) or not np.isin(chosen, (0, 1)).all():
+        if chosen.size not in (1, len(states)) or ((chosen != 0) & (chosen != 1)).any():
             raise ValueError(f"seats must be 0 or 1, one or one for each of {len(states)} kitchens")
         return self._encode(states, chosen, (len(states), *self.shape), out)
 

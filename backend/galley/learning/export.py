@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import onnx
+from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 
 from galley.learning.cloning import Layer
+from galley.learning.policy import SLOPE
 
 OPSET = 17
 IR_VERSION = 8
@@ -33,11 +35,46 @@ def dense_onnx(layers: Sequence[Layer]) -> bytes:
         if not last:
             value = f"tanh_{place}"
             nodes.append(helper.make_node("Tanh", [result], [value], name=value))
+    return _file(nodes, constants, [layers[0][0].shape[1]], layers[-1][0].shape[0])
+
+
+def grid_onnx(weights: Mapping[str, NDArray[np.float32]], shape: tuple[int, ...]) -> bytes:
+    """An ONNX file of a `Policy` from its state dict as arrays, for observations of `shape` [C, H, W].
+
+    Input `observation` float32 [B, C, H, W], output `logits` float32 [B, 6], dynamic B; the value is left out.
+    """
+    nodes, value = [], "observation"
+    used = {name: array for name, array in weights.items() if not name.startswith("value.")}
+    constants = [numpy_helper.from_array(np.ascontiguousarray(array), name) for name, array in used.items()]
+    for name in (name.removesuffix(".weight") for name in used if name.endswith(".weight")):
+        inputs = [value, f"{name}.weight", f"{name}.bias"]
+        kernel = weights[f"{name}.weight"].shape[2:]
+        if kernel:
+            reach = 0 if name == "third" else kernel[0] // 2
+            nodes.append(helper.make_node("Conv", inputs, [f"{name}_sum"], name=name, pads=[reach] * 4))
+        else:
+            if name == "dense.0":
+                nodes.append(helper.make_node("Flatten", [value], ["flat"], name="flatten"))
+                inputs[0] = "flat"
+            result = "logits" if name == "logits" else f"{name}_sum"
+            nodes.append(helper.make_node("Gemm", inputs, [result], name=name, transB=1))
+        if name != "logits":
+            value = f"{name}_out"
+            nodes.append(
+                helper.make_node("LeakyRelu", [f"{name}_sum"], [value], name=f"{name}_leaky", alpha=SLOPE)
+            )
+    return _file(nodes, constants, list(shape), weights["logits.bias"].shape[0])
+
+
+def _file(
+    nodes: list[onnx.NodeProto], constants: list[onnx.TensorProto], shape: list[int], actions: int
+) -> bytes:
+    """The checked bytes of a policy's graph, the same for the same graph."""
     graph = helper.make_graph(
         nodes,
         "policy",
-        [helper.make_tensor_value_info("observation", TensorProto.FLOAT, ["B", layers[0][0].shape[1]])],
-        [helper.make_tensor_value_info("logits", TensorProto.FLOAT, ["B", layers[-1][0].shape[0]])],
+        [helper.make_tensor_value_info("observation", TensorProto.FLOAT, ["B", *shape])],
+        [helper.make_tensor_value_info("logits", TensorProto.FLOAT, ["B", actions])],
         constants,
     )
     model = helper.make_model(

@@ -1,0 +1,120 @@
+"""`galley learn train`: partners trained by self-play and by populations."""
+
+from __future__ import annotations
+
+import os
+import time
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from galley.commands.options import WorkspaceOption
+from galley.errors import GalleyError
+
+
+class Method(StrEnum):
+    """How a partner is trained."""
+
+    sp = "sp"
+    pbt = "pbt"
+    fcp = "fcp"
+    mep = "mep"
+    cole_sv = "cole-sv"
+    cole_r = "cole-r"
+
+
+def train(
+    method: Annotated[Method, typer.Argument(metavar="METHOD", help="sp pbt fcp mep cole-sv cole-r")],
+    layout: Annotated[str, typer.Option(metavar="NAME", help="Layout to train on.")],
+    seed: Annotated[int, typer.Option(min=0, metavar="N", help="Seed of everything in the run.")] = 0,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Larger steps than the papers', for a fifth of the ticks.")
+    ] = False,
+    scale: Annotated[
+        float, typer.Option(metavar="X", help="Share of the papers' ticks (COLE: generations).")
+    ] = 1.0,
+    ratio: Annotated[
+        str, typer.Option(metavar="A:B", help="COLE: kitchens with itself : with others.")
+    ] = "1:3",
+    generations: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="COLE: generations, whatever the scale.")
+    ] = None,
+    generation_updates: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="COLE: updates of a generation.", show_default="10")
+    ] = None,
+    population: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="PBT, FCP, MEP: policies in the population.", show_default="3, 8, 5"),
+    ] = None,
+    no_wpg: Annotated[
+        bool, typer.Option("--no-wpg", help="COLE: leave the weighted PageRank out (ablation).")
+    ] = False,
+    no_sucg: Annotated[
+        bool, typer.Option("--no-sucg", help="COLE: draw partners by the solver alone (ablation).")
+    ] = False,
+    set_: Annotated[
+        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Change a constant of PPO.")
+    ] = None,
+    threads: Annotated[
+        int | None,
+        typer.Option(
+            min=1, metavar="N", help="Threads; other numbers round differently.", show_default="all"
+        ),
+    ] = None,
+    device: Annotated[str, typer.Option(metavar="NAME", help="cpu or cuda.")] = "cpu",
+    bf16: Annotated[
+        bool, typer.Option("--bf16", help="Networks in bfloat16, where the processor has it.")
+    ] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder of the run.", show_default="runs/METHOD-LAYOUT-SEED"),
+    ] = None,
+    workspace: WorkspaceOption = Path(),
+) -> None:
+    """Train a partner; the same command goes on with a run that was stopped."""
+    from tqdm import tqdm
+
+    from galley.kitchen.layout_file import find_layout
+    from galley.learning.methods import Asked, described, machine_of, make, parsed_changes
+    from galley.learning.populations.cole import ColeSettings
+    from galley.learning.policy import use_threads
+    from galley.learning.run_folder import RunFolder
+    from galley.learning.training import run
+    from galley.workspace import Workspace
+
+    place = Workspace(workspace)
+    kitchen = find_layout(place, layout)
+    asked = Asked(
+        method=method.value,
+        layout=kitchen.name,
+        seed=seed,
+        quick=quick,
+        scale=scale,
+        ratio=ratio,
+        weighted=not no_wpg,
+        exploration=0.0 if no_sucg else ColeSettings.exploration,
+        generations=generations,
+        generation_updates=generation_updates,
+        population=population,
+        changes=parsed_changes(set_ or ()),
+        threads=threads or os.cpu_count() or 1,
+        device=device,
+        bf16=bf16,
+    )
+    use_threads(asked.threads)
+    training = make(asked, kitchen)
+    path = out or place.path / "runs" / f"{method.value}-{kitchen.name}-{seed}"
+    folder = RunFolder(path, described(asked))
+    with tqdm(total=1.0, bar_format="{percentage:5.1f}%|{bar}| {elapsed}<{remaining} {postfix}") as bar:
+
+        def tell(share: float, row: dict[str, Any]) -> None:
+            bar.n = share
+            bar.set_postfix_str(f"{row['stage']} {row['generation']} score {row['score']:.1f}", refresh=True)
+
+        policy = run(
+            training, folder, lambda name: folder.member(name, kitchen, machine_of(asked).device), tell=tell
+        )
+    folder.keep("best", policy)
+    typer.echo(f"{path}: done; make an agent of it with: galley learn export {path} --name {method.value}")

@@ -1,0 +1,112 @@
+"""The policy network of the field's learned agents: three convolutions, three dense layers, two heads."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+import numpy as np
+import torch
+from torch import nn
+from torch.nn import functional as F
+
+from galley.kitchen import ACTIONS, Encoder, Layout
+from galley.learning import sparse_kernel as kernels
+
+ENCODING = "grid"
+FILTERS = 25
+HIDDEN = 64
+SLOPE = 0.2
+_FIRST_KERNEL = 5
+_NEXT_KERNEL = 3
+
+
+class _SparseConvolution(torch.autograd.Function):
+    """The leaky ReLU of a "same" convolution on observations that differ little from a map."""
+
+    @staticmethod
+    def forward(
+        ctx: Any, seen: torch.Tensor, map_: torch.Tensor, weight: torch.Tensor, bias: torch.Tensor
+    ) -> torch.Tensor:
+        channels, height, width = map_.shape
+        count, size = weight.shape[0], weight.shape[2]
+        filters = np.ascontiguousarray(weight.detach().numpy().transpose(1, 2, 3, 0)[:, :, ::-1])
+        filters = filters.reshape(channels, size, size * count)
+        observations = seen.reshape(len(seen), -1).numpy()
+        flat_map = map_.reshape(-1).numpy()
+        of_map = np.tile(bias.detach().numpy(), height * width)
+        nothing, everywhere = np.zeros_like(flat_map), np.flatnonzero(flat_map).astype(np.int32)
+        kernels.spread(flat_map, nothing, everywhere, filters, height, width, of_map)
+        out = torch.empty(len(seen), height * width * count)
+        kernels.convolve(observations, flat_map, filters, of_map, height, width, SLOPE, out.numpy())
+        ctx.shape = (channels, size, count, height, width)
+        ctx.kept = (observations, flat_map, out.numpy())
+        return out.view(-1, height, width, count).permute(0, 3, 1, 2)
+
+    @staticmethod
+    def backward(ctx: Any, *gradients: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
+        channels, size, count, height, width = ctx.shape
+        observations, flat_map, out = ctx.kept
+        asked = gradients[0].permute(0, 2, 3, 1).reshape(len(out), -1).numpy()
+        parts = torch.get_num_threads()
+        of_filters = np.zeros((parts, channels, size, size * count), dtype=np.float32)
+        of_map = np.zeros((parts, height * width * count), dtype=np.float32)
+        kernels.convolve_back(observations, flat_map, out, asked, height, width, SLOPE, of_filters, of_map)
+        filters, rest = of_filters.sum(axis=0), of_map.sum(axis=0)
+        nothing, everywhere = np.zeros_like(flat_map), np.flatnonzero(flat_map).astype(np.int32)
+        kernels.gather(flat_map, nothing, everywhere, rest, height, width, filters)
+        weight = filters.reshape(channels, size, size, count)[:, :, ::-1].transpose(3, 0, 1, 2)
+        bias = rest.reshape(-1, count).sum(axis=0)
+        return None, None, torch.from_numpy(np.ascontiguousarray(weight)), torch.from_numpy(bias)
+
+
+class Policy(nn.Module):
+    """A policy and a value for observations `grid` uint8 [B, 26, H, W] of one layout.
+
+    Convolutions 5x5 and 3x3 "same" and 3x3 "valid" with 25 filters, dense layers of 64, leaky ReLU 0.2; the
+    heads share them. On a CPU the first convolution uses that observations are sparse; the result is the same.
+
+    Source: COLE paper, App. C; Carroll et al. 2019 (arXiv:1910.05789), App. C, for kernels and slope.
+    """
+
+    map: torch.Tensor
+
+    def __init__(self, layout: Layout, generator: torch.Generator | None = None) -> None:
+        super().__init__()
+        height, width = layout.tiles.shape
+        encoder = Encoder(layout, ENCODING)
+        self.register_buffer("map", torch.from_numpy(encoder.map), persistent=False)
+        inside = FILTERS * (height - _NEXT_KERNEL + 1) * (width - _NEXT_KERNEL + 1)
+        self.first = nn.Conv2d(encoder.shape[0], FILTERS, _FIRST_KERNEL, padding=_FIRST_KERNEL // 2)
+        self.second = nn.Conv2d(FILTERS, FILTERS, _NEXT_KERNEL, padding=_NEXT_KERNEL // 2)
+        self.third = nn.Conv2d(FILTERS, FILTERS, _NEXT_KERNEL)
+        self.dense = nn.ModuleList(
+            [nn.Linear(inside, HIDDEN), nn.Linear(HIDDEN, HIDDEN), nn.Linear(HIDDEN, HIDDEN)]
+        )
+        self.logits = nn.Linear(HIDDEN, len(ACTIONS))
+        self.value = nn.Linear(HIDDEN, 1)
+        for layer in self.modules():
+            if not isinstance(layer, (nn.Conv2d, nn.Linear)):
+                continue
+            gain = 0.01 if layer is self.logits else 1.0 if layer is self.value else 2.0**0.5
+            nn.init.orthogonal_(layer.weight, gain, generator=generator)
+            nn.init.zeros_(layer.bias)
+        self.to(memory_format=torch.channels_last)
+
+    def forward(self, seen: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """Logits float32 [B, 6] and values float32 [B] of observations uint8 [B, 26, H, W]."""
+        if seen.device.type == "cpu":
+            flow = _SparseConvolution.apply(seen, self.map, self.first.weight, self.first.bias)
+        else:
+            flow = F.leaky_relu(self.first(seen.float().contiguous(memory_format=torch.channels_last)), SLOPE)
+        flow = F.leaky_relu(self.second(flow), SLOPE)
+        flow = F.leaky_relu(self.third(flow), SLOPE).flatten(1)
+        for layer in self.dense:
+            flow = F.leaky_relu(layer(flow), SLOPE)
+        return self.logits(flow).float(), self.value(flow).float().squeeze(1)
+
+
+def use_threads(threads: int) -> None:
+    """Nothing; PyTorch and the kernels here use that many threads from now on."""
+    torch.set_num_threads(threads)
+    numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))

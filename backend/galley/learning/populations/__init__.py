@@ -1,0 +1,1 @@
+"""Methods that make partners: self-play and those that train with a population."""

@@ -1,0 +1,122 @@
+"""The compiled first convolution of a policy on sparse observations, in one file for Numba's cache.
+
+An observation of a kitchen is the layout's map, the same for every tick, and a handful of numbers besides: where
+the chefs stand and look, what lies, is held or cooks. A convolution is linear, so that of the map is worked out
+once, and each other number adds its filters where it reaches: about 1 % of the dense work, with the same result.
+
+Arrays are flat: `observations` uint8 [B, C*H*W]; `filters` float32 [C, K, K*F], whose last axis runs over the
+columns *backwards* (K) and the filters (F), so that what one number adds to a row of the result is contiguous;
+results float32 [B, H*W*F], channels last. The convolution is "same": K odd, zeros around.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, prange
+from numpy import float32, int32, uint8
+from numpy.typing import NDArray
+
+
+_BLOCK = 64
+
+
+@njit(cache=True, nogil=True)
+def differing(seen: NDArray[uint8], map_: NDArray[uint8], places: NDArray[int32]) -> int:
+    """How many numbers of `seen` differ from `map_`, both uint8 [C*H*W]; their places come first in `places`."""
+    found = 0
+    for start in range(0, seen.size, _BLOCK):
+        end = min(start + _BLOCK, seen.size)
+        different = uint8(0)
+        for place in range(start, end):
+            different |= seen[place] ^ map_[place]
+        if different:
+            for place in range(start, end):
+                if seen[place] != map_[place]:
+                    places[found] = place
+                    found += 1
+    return found
+
+
+@njit(cache=True, fastmath=True, nogil=True)
+def spread(
+    seen: NDArray[uint8], map_: NDArray[uint8], places: NDArray[int32], filters: NDArray[float32],
+    height: int, width: int, out: NDArray[float32],
+) -> None:  # fmt: skip
+    """Nothing; adds the convolution of `seen` - `map_`, which differ at `places`, to `out` float32 [H*W*F]."""
+    reach = filters.shape[1] // 2
+    count = filters.shape[2] // filters.shape[1]
+    for place in places:
+        number = float32(seen[place]) - float32(map_[place])
+        channel, cell = place // (height * width), place % (height * width)
+        y, x = cell // width, cell % width
+        first, last = max(0, x - reach), min(width, x + reach + 1)
+        skipped = (first - x + reach) * count
+        for row in range(max(0, y - reach), min(height, y + reach + 1)):
+            into = out[(row * width + first) * count : (row * width + last) * count]
+            weights = filters[channel, y - row + reach, skipped : skipped + into.size]
+            for index in range(into.size):
+                into[index] += number * weights[index]
+
+
+@njit(cache=True, fastmath=True, nogil=True)
+def gather(
+    seen: NDArray[uint8], map_: NDArray[uint8], places: NDArray[int32], gradient: NDArray[float32],
+    height: int, width: int, out: NDArray[float32],
+) -> None:  # fmt: skip
+    """Nothing; the transpose of `spread`: adds to `out` float32 [C, K, K*F] what `gradient` [H*W*F] asks."""
+    reach = out.shape[1] // 2
+    count = out.shape[2] // out.shape[1]
+    for place in places:
+        number = float32(seen[place]) - float32(map_[place])
+        channel, cell = place // (height * width), place % (height * width)
+        y, x = cell // width, cell % width
+        first, last = max(0, x - reach), min(width, x + reach + 1)
+        skipped = (first - x + reach) * count
+        for row in range(max(0, y - reach), min(height, y + reach + 1)):
+            asked = gradient[(row * width + first) * count : (row * width + last) * count]
+            into = out[channel, y - row + reach, skipped : skipped + asked.size]
+            for index in range(asked.size):
+                into[index] += number * asked[index]
+
+
+@njit(cache=True, fastmath=True, parallel=True)
+def convolve(
+    observations: NDArray[uint8], map_: NDArray[uint8], filters: NDArray[float32], of_map: NDArray[float32],
+    height: int, width: int, slope: float, out: NDArray[float32],
+) -> None:  # fmt: skip
+    """Nothing; fills `out` with the leaky ReLU of the convolution; `of_map` [H*W*F] is that of the map."""
+    lower = float32(slope)
+    for index in prange(observations.shape[0]):
+        row = out[index]
+        places = np.empty(map_.size, dtype=int32)
+        found = differing(observations[index], map_, places)
+        row[:] = of_map
+        spread(observations[index], map_, places[:found], filters, height, width, row)
+        for place in range(row.size):
+            row[place] = max(row[place], lower * row[place])
+
+
+@njit(cache=True, fastmath=True, parallel=True)
+def convolve_back(
+    observations: NDArray[uint8], map_: NDArray[uint8], out: NDArray[float32], gradient: NDArray[float32],
+    height: int, width: int, slope: float, of_filters: NDArray[float32], of_map: NDArray[float32],
+) -> None:  # fmt: skip
+    """Nothing; adds the gradients of `filters` to `of_filters` [P, C, K, K*F], of the map's result to `of_map`.
+
+    `of_map` is [P, H*W*F]. The batch is cut into P parts, each summed in order by one thread, so that the result
+    depends on P but not on how the threads run.
+    """
+    parts = of_filters.shape[0]
+    size = observations.shape[0]
+    lower = float32(slope)
+    for part in prange(parts):
+        asked = np.empty(out.shape[1], dtype=float32)
+        places = np.empty(map_.size, dtype=int32)
+        total = of_map[part]
+        for index in range(part * size // parts, (part + 1) * size // parts):
+            for place in range(asked.size):
+                value = gradient[index, place]
+                asked[place] = value if out[index, place] > 0 else lower * value
+                total[place] += asked[place]
+            found = differing(observations[index], map_, places)
+            gather(observations[index], map_, places[:found], asked, height, width, of_filters[part])
