@@ -32,7 +32,7 @@ def test_every_route_is_known_to_these_tests(office: Office) -> None:
     assert {path.split("/")[2] for _, path in routes if path.count("/") > 1} == {
         "login", "logout", "live.json", "studies", "visits", "rounds",
     }  # fmt: skip
-    assert sum(method == "POST" for method, _ in routes) == 5
+    assert sum(method == "POST" for method, _ in routes) == 7
 
 
 def test_nobody_gets_in_without_a_login(office: Office) -> None:

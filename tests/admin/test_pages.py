@@ -328,3 +328,26 @@ def test_arrivals_are_shown_as_a_chart_and_a_table_without_tests(office: Office)
     assert len(re.findall(r'<rect class="(?:done|here|gone)" x=', parts["arrivals"])) >= 2
     counts = re.findall(r'<td class="n">(\d+)</td>', parts["arrivals_table"])
     assert sum(map(int, counts[::4])) == 4
+
+
+def test_test_links_are_made_shown_and_withdrawn(fresh: Office) -> None:
+    researcher = fresh.researcher()
+    answer = researcher.send("/studies/short/test-links", cell="")
+    assert answer.status_code == 303
+    page = researcher.page("/studies/short")
+    found = re.search(r'value="(http://[^"]+/s/short\?galley-test=([^"]+))"', page)
+    assert found
+    assert len(found[2]) >= 32
+    assert f"{NAME}, good until" in page
+    assert researcher.send("/studies/short/test-links", cell="77").status_code == 400
+    assert researcher.send("/studies/nothing/test-links", cell="").status_code == 404
+    assert researcher.send("/studies/short/test-links/withdraw", link="other").status_code == 404
+    assert researcher.send("/studies/short/test-links/withdraw", link=found[2]).status_code == 303
+    assert "galley-test=" not in researcher.page("/studies/short")
+    fresh.clock.at_s += 1
+    researcher.send("/studies/short/test-links", cell="")
+    fresh.clock.at_s += 6 * 86_400
+    later = fresh.researcher()
+    assert "galley-test=" in later.page("/studies/short")
+    fresh.clock.at_s += 2 * 86_400
+    assert "galley-test=" not in fresh.researcher().page("/studies/short")

@@ -386,3 +386,17 @@ SESSIONS = Table(
     _of("expires_ms", BigInteger, "when the session ends by itself"),
     info={"meaning": "one row per researcher's login"},
 )
+
+TEST_LINKS = Table(
+    "test_links",
+    METADATA,
+    _of("token", String(64), "secret of the link", primary_key=True),
+    _of("study", String(200), "name of the study", ForeignKey("studies.name"), index=True),
+    _of("cell", Integer, "which cell of the design, from 0; empty for any", nullable=True),
+    _of("author", String(200), "name of the researcher"),
+    _of("created_ms", BigInteger, "when it was made"),
+    _of("expires_ms", BigInteger, "until when it is good"),
+    info={
+        "meaning": "one row per link with which researchers walk a study that runs, without counting in it"
+    },
+)

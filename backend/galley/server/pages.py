@@ -28,7 +28,7 @@ from galley.server.step_pages import (
 )
 from galley.server.templates import templates as templates
 from galley.server.time_limits import time_is_up
-from galley.server.visits import GRACE_S, Visit, Visits
+from galley.server.visits import GRACE_S, TEST_PARAM, Visit, Visits
 from galley.study.languages import choose_language
 from galley.study.plan import Step
 from galley.study.progress import (
@@ -62,6 +62,9 @@ INVITED_ONLY = mark("By invitation")
 UNINVITED = mark(
     "This study is for people who were invited. "
     "Please use the whole link of your invitation, with the code at its end."
+)
+UNTESTED = mark(
+    "This test link is not good any more. Please make a new one on the study's page for researchers."
 )
 
 
@@ -141,6 +144,7 @@ class Pages:
             action=f"/s/{study}/begin" + (f"?{urlencode(others)}" if others else ""),
             language=spoken.language,
             languages=offered,
+            test=TEST_PARAM in params,
         )
 
     async def begin(self, request: Request, study: str) -> Response:
@@ -266,6 +270,8 @@ class Pages:
     def _not_begun(self, study: Study, why: str) -> Response:
         if why == "uninvited":
             return self.plain(403, INVITED_ONLY, UNINVITED, study.language)
+        if why == "untested":
+            return self.plain(403, NOT_USED, UNTESTED, study.language)
         return self._page("ending.html", study=public_study(study), language=study.language, outcome=why)
 
     def _step_page(

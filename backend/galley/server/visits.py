@@ -10,8 +10,9 @@ from weakref import WeakValueDictionary
 
 from galley.records import Arrival, Planned, Store, VisitRow
 from galley.records.standing import Attempt, standing
+from galley.records.test_links import LinkForTests, LinksForTests
 from galley.server.clock import Clock
-from galley.study.assignment import allocate, capacity, cell_number, cells
+from galley.study.assignment import allocate, capacity, cell_number, cells, slot_in_cell
 from galley.study.plan import Plan, Step, plan_visit, visit_seed
 from galley.study.progress import (
     Agreed,
@@ -31,7 +32,10 @@ from galley.translations import Catalogues, Translator
 GRACE_S: Final = 5.0
 """How much later than its limit a form still counts: it was on its way."""
 
-NotBegun = Literal["full", "later", "paused", "closed", "uninvited"]
+TEST_PARAM: Final = "galley-test"
+"""The parameter of a test link; a name that no recruiter's link has."""
+
+NotBegun = Literal["full", "later", "paused", "closed", "uninvited", "untested"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,13 +125,26 @@ class Visits:
         told = study.config.recruitment.participant
         return (study.kept(params).get(told) if told is not None else None) or None
 
+    async def test_link(
+        self, study: Study, params: Mapping[str, str]
+    ) -> LinkForTests | Literal["bad"] | None:
+        """The test link that parameters name; `bad` if it is not good any more; None if they name none."""
+        token = params.get(TEST_PARAM)
+        if token is None:
+            return None
+        links = LinksForTests(self._store)
+        return await asyncio.wrap_future(links.find(study.name, token, self._clock.ms())) or "bad"
+
     async def closed(self, study: Study, params: Mapping[str, str]) -> NotBegun | None:
         """Why somebody with such a link cannot begin, as far as is known before they try; None if they can.
 
-        Who may have a visit already is never sent away: beginning leads back to it.
+        Who may have a visit already is never sent away: beginning leads back to it. Test links always let in.
         """
         if self._preview:
             return None
+        link = await self.test_link(study, params)
+        if link is not None:
+            return "untested" if link == "bad" else None
         who = self.person(study, params)
         if study.invitations is not None and who is None:
             return "uninvited"
@@ -137,13 +154,19 @@ class Visits:
     async def begin(self, study: Study, params: Mapping[str, str], language: str) -> Visit | NotBegun:
         """A visit at its first step, or the one that this person has already, or why there is none."""
         who = self.person(study, params)
-        if study.invitations is not None and who is None and not self._preview:
+        link = await self.test_link(study, params)
+        if link == "bad":
+            return "untested"
+        test = self._preview or link is not None
+        if study.invitations is not None and who is None and not test:
             return "uninvited"
         spoken = study.in_language(language)
         say = self.say(spoken.language)
         design = cells(study.config)
 
         def plan(visit_no: int, slot: int | None) -> Planned:
+            if slot is None and link is not None and link.cell is not None:
+                slot = slot_in_cell(study, link.cell, visit_no)
             seed = visit_seed(study, visit_no)
             made = plan_visit(spoken, seed, visit_no, slot, say)
             return Planned(seed, made.to_json(), made.condition, design[cell_number(study, made.slot)])
@@ -158,7 +181,7 @@ class Visits:
             spoken.language,
             who,
             once=study.invitations is not None or study.config.recruitment.once,
-            test=self._preview,
+            test=test,
         )
         begun = await asyncio.wrap_future(
             self._store.begin_visit(

@@ -91,6 +91,13 @@ def place_in_cell(study: Study, slot: int) -> int:
     return slot // len(cells(study.config))
 
 
+def slot_in_cell(study: Study, cell: int, place: int) -> int:
+    """The slot of a cell that has `place` slots of it before; of the last cell if there are not so many."""
+    count = len(cells(study.config))
+    block = range(place * count, (place + 1) * count)
+    return next(slot for slot in block if cell_number(study, slot) == min(cell, count - 1))
+
+
 def cell_of_slot(study: Study, slot: int) -> dict[str, str]:
     """The condition of a slot: the level of every factor, in the order of the file."""
     config = study.config

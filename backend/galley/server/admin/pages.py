@@ -55,6 +55,8 @@ def researcher_pages(
     deeds = {
         "/logout": gate.logout,
         "/studies/{study}/state": about_studies.set_state,
+        "/studies/{study}/test-links": about_studies.make_test_link,
+        "/studies/{study}/test-links/withdraw": about_studies.withdraw_test_link,
         "/visits/{visit:int}/notes": about_visits.note,
         "/visits/{visit:int}/erase": about_visits.erase,
     }

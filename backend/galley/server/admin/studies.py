@@ -11,14 +11,18 @@ from fastapi.responses import JSONResponse, RedirectResponse, Response
 from galley.records import overview
 from galley.records.rows import SessionRow
 from galley.records.tables import STUDY_STATES, VISIT_STATUSES
+from galley.records.test_links import LinksForTests
 from galley.server.admin.desk import Desk, link
 from galley.server.admin.downloads import DOWNLOADS
 from galley.server.admin.gate import HOME, NEVER_CACHED, Form, first
-from galley.server.admin.tallies import arrivals, cell_rows, flag_tallies, study_rows
-from galley.study.assignment import capacity
+from galley.server.admin.tallies import DAY_MS, arrivals, cell_rows, flag_tallies, study_rows
+from galley.server.visits import TEST_PARAM
+from galley.study.assignment import capacity, cells
+from galley.study.study import Study
 
 VISITS_A_PAGE = 50
 ROUNDS_A_PAGE = 50
+TEST_LINK_DAYS = 7
 
 
 class StudyPages:
@@ -56,9 +60,63 @@ class StudyPages:
             query = "&".join(f"{key}={{{{%{key}%}}}}" for key in kept)
             links.append(("With a recruiter's parameters", f"{request.base_url}s/{name}?{query}"))
         title = name if study is None else study.title
+        tests = () if study is None else await self._test_links(request, study)
+        design = () if study is None else cells(study.config)
         return self._desk.show(
-            session, "study.html", name=name, title=title, links=links, downloads=DOWNLOADS, **state
+            session,
+            "study.html",
+            name=name,
+            title=title,
+            links=links,
+            test_links=tests,
+            design=design if len(design) > 1 else (),
+            downloads=DOWNLOADS,
+            **state,
         )
+
+    async def _test_links(self, request: Request, study: Study) -> list[dict[str, Any]]:
+        """The study's test links, newest first, as the page shows them."""
+        found = await asyncio.wrap_future(
+            LinksForTests(self._desk.store).of_study(study.name, self._desk.clock.ms())
+        )
+        design = cells(study.config)
+        return [
+            {
+                "token": link.token,
+                "url": f"{request.base_url}s/{study.name}?{TEST_PARAM}={link.token}",
+                "cell": None if link.cell is None else design[min(link.cell, len(design) - 1)],
+                "author": link.author,
+                "expires_ms": link.expires_ms,
+            }
+            for link in found
+        ]
+
+    async def make_test_link(self, request: Request, session: SessionRow, form: Form) -> Response:
+        """A new test link, for one cell of the design or for any."""
+        name = request.path_params["study"]
+        study = self._desk.studies.get(name)
+        if study is None:
+            return self._desk.missing(session, "study")
+        chosen, now_ms = first(form, "cell"), self._desk.clock.ms()
+        count = len(cells(study.config))
+        known = {str(number): number for number in range(count)} | {"": None}
+        if chosen not in known:
+            told = f"The design has {count} cells, and this is none of them."
+            return self._desk.gate.plain(session, 400, "Not done", told)
+        links = LinksForTests(self._desk.store)
+        author = session.researcher.name
+        await asyncio.wrap_future(
+            links.make(name, known[chosen], author, now_ms, now_ms + TEST_LINK_DAYS * DAY_MS)
+        )
+        return RedirectResponse(f"{HOME}/studies/{name}#tests", 303, NEVER_CACHED)
+
+    async def withdraw_test_link(self, request: Request, session: SessionRow, form: Form) -> Response:
+        """Let a test link be good for nothing any more; visits begun with it go on."""
+        name = request.path_params["study"]
+        links = LinksForTests(self._desk.store)
+        if not await asyncio.wrap_future(links.withdraw(name, first(form, "link"))):
+            return self._desk.missing(session, "test link")
+        return RedirectResponse(f"{HOME}/studies/{name}#tests", 303, NEVER_CACHED)
 
     async def study_live(self, request: Request, session: SessionRow) -> Response:
         """The numbers of that page, as they are now."""
