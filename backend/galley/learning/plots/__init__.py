@@ -1,0 +1,1 @@
+"""Figures of results and runs, made with matplotlib without its global state."""
