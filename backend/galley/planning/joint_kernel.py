@@ -11,11 +11,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy import int16, int32
+from numpy import int16, int32, int64, uint64
 from numpy.typing import NDArray
 
 from galley.kitchen.codes import STAY
-from galley.planning.compiling import kernel
+from galley.planning.compiling import kernel, lean_kernel
 
 FAR = 32000
 """The cost of what cannot be reached."""
@@ -23,6 +23,10 @@ FREE = 0
 """The goal of a chef that may end anywhere."""
 MOST_POSES = 4
 NONE = -1
+STEPS_KNOWN = 1 << 17
+"""First ticks of joint plans that are kept; of two with one place the later stays."""
+CODES = 64
+"""More than any code of a joint action, 8 * action of seat 0 + action of seat 1."""
 
 
 class JointTables(NamedTuple):
@@ -41,9 +45,10 @@ class JointTables(NamedTuple):
     used: NDArray[int32]  # [1], tables filled so far
     tables: NDArray[int16]
     queue: NDArray[int32]  # [(F + 4)^2], space to work in
+    steps: NDArray[int64]  # [STEPS_KNOWN], what `known_step` was asked, times CODES, plus its answer; or 0
 
 
-@kernel
+@lean_kernel
 def _before(joint: JointTables, poses: NDArray[int16], state: int, bumps: bool, found: NDArray[int16]) -> int:
     """How many (state, action) of one chef may lead to `state`; written to `found` int16[9, 2]."""
     floors = joint.cell_of.size
@@ -76,7 +81,7 @@ def _before(joint: JointTables, poses: NDArray[int16], state: int, bumps: bool, 
     return count
 
 
-@kernel
+@lean_kernel
 def _faces_floor(joint: JointTables, poses: NDArray[int16], count: int) -> bool:
     found = False
     for index in range(count):
@@ -154,7 +159,7 @@ def _fill(joint: JointTables, goal0: int, goal1: int, table: NDArray[int16]) -> 
                     last += 1
 
 
-@kernel
+@lean_kernel
 def table_of(joint: JointTables, goal0: int, goal1: int) -> int:
     """The slot of the table for a pair of goals, filled now if need be in place of the oldest."""
     slot = joint.slot[goal0, goal1]
@@ -174,7 +179,7 @@ def table_of(joint: JointTables, goal0: int, goal1: int) -> int:
     return int(slot)
 
 
-@kernel
+@lean_kernel
 def _settled(joint: JointTables, goal: int, pose: int) -> int:
     """The state of a chef that has settled at `pose`, or of its cell if `pose` does not end its goal."""
     for index in range(MOST_POSES):
@@ -183,7 +188,7 @@ def _settled(joint: JointTables, goal: int, pose: int) -> int:
     return pose // 4
 
 
-@kernel
+@lean_kernel
 def _cost(joint: JointTables, slot: int, goal0: int, goal1: int, pose0: int, pose1: int) -> int:
     """`joint_cost` from the table in a slot."""
     table = joint.tables[slot]
@@ -202,7 +207,7 @@ def _cost(joint: JointTables, slot: int, goal0: int, goal1: int, pose0: int, pos
     return int(best)
 
 
-@kernel
+@lean_kernel
 def joint_cost(joint: JointTables, goal0: int, goal1: int, pose0: int, pose1: int) -> int:
     """The fewest ticks from poses (4 * floor + facing) until both goals hold at once; FAR if never."""
     if goal0 == FREE and goal1 == FREE:
@@ -210,7 +215,7 @@ def joint_cost(joint: JointTables, goal0: int, goal1: int, pose0: int, pose1: in
     return _cost(joint, table_of(joint, goal0, goal1), goal0, goal1, pose0, pose1)
 
 
-@kernel
+@lean_kernel
 def moved(joint: JointTables, pose0: int, pose1: int, act0: int, act1: int) -> tuple[int, int]:
     """The poses after one tick in which the chefs move or stay, as `galley.kitchen.rules` has it."""
     at0 = pose0 // 4
@@ -229,7 +234,7 @@ def moved(joint: JointTables, pose0: int, pose1: int, act0: int, act1: int) -> t
     return 4 * to0 + facing0, 4 * to1 + facing1
 
 
-@kernel
+@lean_kernel
 def _alone(joint: JointTables, costs: NDArray[int16], goal: int, pose: int) -> int:
     """The fewest actions to a tile that is a goal, the other chef left out; 0 for other goals."""
     if goal == FREE or goal > joint.floor_of.size:
@@ -238,7 +243,7 @@ def _alone(joint: JointTables, costs: NDArray[int16], goal: int, pose: int) -> i
     return FAR if cost < 0 else int(cost)
 
 
-@kernel
+@lean_kernel
 def joint_step(
     joint: JointTables, costs: NDArray[int16], goal0: int, goal1: int, pose0: int, pose1: int, first: int
 ) -> int:
@@ -270,7 +275,7 @@ def joint_step(
     return best
 
 
-@kernel
+@lean_kernel
 def step_with_way(
     joint: JointTables, costs: NDArray[int16], goal0: int, goal1: int, first: int, pose0: int, pose1: int
 ) -> int:
@@ -280,7 +285,7 @@ def step_with_way(
     slot = table_of(joint, one, other)
     both = table_of(joint, goal0, goal1)
     if joint.slot[one, other] != slot:  # the second table took the place of the first
-        return best
+        slot = table_of(joint, one, other)
     cost = _cost(joint, slot, one, other, pose0, pose1)
     if cost >= FAR:
         return best
@@ -298,3 +303,22 @@ def step_with_way(
                 score = this
                 best = 8 * act0 + act1
     return best
+
+
+@lean_kernel
+def known_step(
+    joint: JointTables, costs: NDArray[int16], goal0: int, goal1: int, way: int, pose0: int, pose1: int
+) -> int:
+    """As `joint_step` for seat 0 (`way` 2) or `step_with_way` for a seat (`way` 0, 1), at once when known."""
+    goals = int64(joint.ends.shape[0])
+    poses = int64(4 * joint.cell_of.size)
+    asked = ((((goal0 * goals + goal1) * poses + pose0) * poses + pose1) * 3 + way + 1) * CODES
+    at = (uint64(asked) * uint64(0x9E3779B97F4A7C15)) >> uint64(64 - 17)
+    if joint.steps[at] // CODES * CODES == asked:
+        return int(joint.steps[at] % CODES)
+    if way == 2:
+        code = joint_step(joint, costs, goal0, goal1, pose0, pose1, 0)
+    else:
+        code = step_with_way(joint, costs, goal0, goal1, way, pose0, pose1)
+    joint.steps[at] = asked + code
+    return code

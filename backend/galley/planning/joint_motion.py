@@ -16,6 +16,7 @@ from galley.planning.joint_kernel import (
     FREE,
     MOST_POSES,
     NONE,
+    STEPS_KNOWN,
     JointTables,
     joint_cost,
     joint_step,
@@ -150,6 +151,7 @@ def joint_tables(layout: Layout) -> JointTables:
         used=np.zeros(1, dtype=np.int32),
         tables=np.empty((slots, size, size), dtype=np.int16),
         queue=np.empty(size * size, dtype=np.int32),
+        steps=np.zeros(STEPS_KNOWN, dtype=np.int64),
     )
 
 

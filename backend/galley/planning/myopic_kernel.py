@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 from numpy import bool_, int16
 from numpy.typing import NDArray
 
@@ -37,7 +36,7 @@ from galley.kitchen.codes import (
     TOMATO,
     TOMATO_DISPENSER,
 )
-from galley.planning.compiling import kernel
+from galley.planning.compiling import lean_kernel
 
 # What the chef remembers of the tick before, int16 [MEMORY_SIZE].
 KNOWN = 0
@@ -55,12 +54,12 @@ MOST_WANDERS = 4
 NOWHERE = -1
 
 
-@kernel
+@lean_kernel
 def _tile(spec: NDArray[int16], cell: int) -> int:
     return int(spec[SPEC_TILES + cell])
 
 
-@kernel
+@lean_kernel
 def _dispenser_of(thing: int) -> int:
     """The tile that gives an ingredient or a dish."""
     if thing == DISH:
@@ -68,14 +67,16 @@ def _dispenser_of(thing: int) -> int:
     return ONION_DISPENSER if thing == ONION else TOMATO_DISPENSER
 
 
-@kernel
+@lean_kernel
 def reaches_tile(spec: NDArray[int16], reach: NDArray[bool_], seat: int, tile: int) -> bool:
     """Whether a seat can face some tile of this code."""
-    tiles = spec[SPEC_TILES : SPEC_TILES + reach.shape[1]]
-    return bool(np.any(reach[seat] & (tiles == tile)))
+    found = False
+    for cell in range(reach.shape[1]):
+        found = found or (reach[seat, cell] and spec[SPEC_TILES + cell] == tile)
+    return found
 
 
-@kernel
+@lean_kernel
 def _lying(state: NDArray[int16], spec: NDArray[int16], reach: NDArray[bool_], seat: int, thing: int) -> int:
     """How many of a thing lie on counters that a seat can reach."""
     count = 0
@@ -85,7 +86,7 @@ def _lying(state: NDArray[int16], spec: NDArray[int16], reach: NDArray[bool_], s
     return count
 
 
-@kernel
+@lean_kernel
 def open_order(spec: NDArray[int16], state: NDArray[int16], ahead: int) -> int:
     """The ingredient of the order `ahead` places behind the first open one; NOTHING beyond the list's end."""
     place = state[ORDERS_DELIVERED] + ahead
@@ -94,7 +95,7 @@ def open_order(spec: NDArray[int16], state: NDArray[int16], ahead: int) -> int:
     return int(spec[SPEC_TILES + spec[SPEC_WIDTH] * spec[SPEC_HEIGHT] + spec[SPEC_POTS] + place])
 
 
-@kernel
+@lean_kernel
 def wanted_kind(spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_]) -> int:
     """The ingredient of the next soup to begin: that of the first open order that no soup answers yet."""
     if spec[SPEC_ORDERS] == 0:
@@ -102,27 +103,33 @@ def wanted_kind(spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool
             spec, reach, 1, ONION_DISPENSER
         )
         return ONION if onions else TOMATO
-    soups = np.zeros(3, dtype=np.int16)
+    onion_soups = 0
+    tomato_soups = 0
     for cell in range(reach.shape[1]):
         held = state[CELLS + cell]
+        kind = NOTHING
         if _tile(spec, cell) == POT:
-            soups[held % POT_COUNT] += 1
+            kind = held % POT_COUNT
         elif _tile(spec, cell) == COUNTER and held > SOUP_OF_KIND:
-            soups[held - SOUP_OF_KIND] += 1
+            kind = held - SOUP_OF_KIND
+        onion_soups += kind == ONION
+        tomato_soups += kind == TOMATO
     for seat in range(2):
         held = state[CHEF * seat + HELD]
-        if held > SOUP_OF_KIND:
-            soups[held - SOUP_OF_KIND] += 1
-    ahead = 0
-    kind = open_order(spec, state, ahead)
-    while kind != NOTHING and soups[kind] > 0:
-        soups[kind] -= 1
-        ahead += 1
+        onion_soups += held == ONION + SOUP_OF_KIND
+        tomato_soups += held == TOMATO + SOUP_OF_KIND
+    for ahead in range(spec[SPEC_ORDERS]):
         kind = open_order(spec, state, ahead)
-    return kind
+        if kind == ONION and onion_soups > 0:
+            onion_soups -= 1
+        elif kind == TOMATO and tomato_soups > 0:
+            tomato_soups -= 1
+        else:
+            return kind
+    return NOTHING
 
 
-@kernel
+@lean_kernel
 def pot_room(packed: int, wanted: int, ingredient: int, any_order: bool) -> int:
     """How many of an ingredient a pot can take, 0 if it should get none."""
     count = packed // POT_COUNT % POT_COUNT
@@ -132,7 +139,7 @@ def pot_room(packed: int, wanted: int, ingredient: int, any_order: bool) -> int:
     return INGREDIENTS_PER_SOUP - count if kind == ingredient else 0
 
 
-@kernel
+@lean_kernel
 def need_of(
     spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], seat: int, thing: int, wanted: int,
     not_for: int,
@@ -150,7 +157,7 @@ def need_of(
     return need
 
 
-@kernel
+@lean_kernel
 def must_pass(
     spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], seat: int, thing: int, wanted: int
 ) -> bool:
@@ -162,7 +169,7 @@ def must_pass(
     return bool(need > _lying(state, spec, reach, other, thing) + (state[CHEF * other + HELD] == thing))
 
 
-@kernel
+@lean_kernel
 def free_counter(
     spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], costs: NDArray[int16], seat: int,
     shared: bool,
@@ -177,7 +184,7 @@ def free_counter(
     return best
 
 
-@kernel
+@lean_kernel
 def _source(
     spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], costs: NDArray[int16], seat: int,
     thing: int, unshared: bool,
@@ -196,7 +203,7 @@ def _source(
     return best
 
 
-@kernel
+@lean_kernel
 def _nearest(spec: NDArray[int16], costs: NDArray[int16], tile: int) -> int:
     """The nearest tile of a code."""
     best = NOWHERE
@@ -206,7 +213,7 @@ def _nearest(spec: NDArray[int16], costs: NDArray[int16], tile: int) -> int:
     return best
 
 
-@kernel
+@lean_kernel
 def drop_at(
     spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], costs: NDArray[int16], seat: int
 ) -> int:
@@ -220,13 +227,16 @@ def drop_at(
     return apart
 
 
-@kernel
+@lean_kernel
 def _together(reach: NDArray[bool_]) -> bool:
     """Whether both chefs reach the same tiles."""
-    return bool(np.all(reach[0] == reach[1]))
+    same = True
+    for cell in range(reach.shape[1]):
+        same = same and reach[0, cell] == reach[1, cell]
+    return same
 
 
-@kernel
+@lean_kernel
 def _empty_handed(
     spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], costs: NDArray[int16], seat: int,
     wanted: int,
@@ -270,7 +280,7 @@ def _empty_handed(
     return NOWHERE
 
 
-@kernel
+@lean_kernel
 def _holding_ingredient(
     spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], costs: NDArray[int16], seat: int,
     wanted: int,
@@ -291,7 +301,7 @@ def _holding_ingredient(
     return drop_at(spec, state, reach, costs, seat)
 
 
-@kernel
+@lean_kernel
 def _holding_dish(
     spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], costs: NDArray[int16], seat: int,
     wanted: int,
@@ -314,7 +324,7 @@ def _holding_dish(
     return drop_at(spec, state, reach, costs, seat)
 
 
-@kernel
+@lean_kernel
 def _holding_soup(
     spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], costs: NDArray[int16], seat: int
 ) -> int:
@@ -330,7 +340,7 @@ def _holding_soup(
     return free_counter(spec, state, reach, costs, seat, True)
 
 
-@kernel
+@lean_kernel
 def target(
     spec: NDArray[int16], all_costs: NDArray[int16], reach: NDArray[bool_], state: NDArray[int16], seat: int
 ) -> int:
@@ -348,7 +358,7 @@ def target(
     return _holding_soup(spec, state, reach, costs, seat)
 
 
-@kernel
+@lean_kernel
 def _planned(
     spec: NDArray[int16], all_costs: NDArray[int16], reach: NDArray[bool_], state: NDArray[int16], seat: int
 ) -> int:
@@ -372,7 +382,7 @@ def _planned(
     return STAY
 
 
-@kernel
+@lean_kernel
 def _ahead(spec: NDArray[int16], cell: int, facing: int) -> int:
     width = spec[SPEC_WIDTH]
     if facing < 2:
@@ -380,7 +390,7 @@ def _ahead(spec: NDArray[int16], cell: int, facing: int) -> int:
     return cell + 1 if facing == 2 else cell - 1
 
 
-@kernel
+@lean_kernel
 def stuck(state: NDArray[int16], seat: int, memory: NDArray[int16]) -> bool:
     """Whether the chef's last move changed neither its cell nor its facing."""
     chef = CHEF * seat
@@ -389,7 +399,7 @@ def stuck(state: NDArray[int16], seat: int, memory: NDArray[int16]) -> bool:
     return bool(tried and same)
 
 
-@kernel
+@lean_kernel
 def _in_the_way(spec: NDArray[int16], state: NDArray[int16], seat: int, memory: NDArray[int16]) -> bool:
     """Whether the other chef's last move failed because this one stood there."""
     other = state[CHEF * (1 - seat) + CELL]
@@ -399,7 +409,7 @@ def _in_the_way(spec: NDArray[int16], state: NDArray[int16], seat: int, memory: 
     return bool(_ahead(spec, other, asked) == state[CHEF * seat + CELL])
 
 
-@kernel
+@lean_kernel
 def wander(spec: NDArray[int16], state: NDArray[int16], seat: int, back: int, draw: float) -> int:
     """A random move to a free cell, `back` only if there is no other; NOWHERE if there is none."""
     cell = state[CHEF * seat + CELL]
@@ -423,7 +433,7 @@ def wander(spec: NDArray[int16], state: NDArray[int16], seat: int, back: int, dr
     return NOWHERE
 
 
-@kernel
+@lean_kernel
 def decide(
     spec: NDArray[int16], all_costs: NDArray[int16], reach: NDArray[bool_], state: NDArray[int16], seat: int,
     memory: NDArray[int16], draw: float,
@@ -445,7 +455,7 @@ def decide(
     return action if move == NOWHERE else move
 
 
-@kernel
+@lean_kernel
 def remember(
     state: NDArray[int16], seat: int, memory: NDArray[int16], own_action: int, other_action: int, draw: float
 ) -> None:

@@ -35,7 +35,7 @@ from galley.kitchen.codes import (
     STAY,
 )
 from galley.kitchen.rules import step
-from galley.planning.compiling import kernel
+from galley.planning.compiling import kernel, lean_kernel
 from galley.planning.joint_kernel import FAR, FREE, JointTables, joint_cost, joint_step
 from galley.planning.myopic_kernel import target, wander
 from galley.planning.subtask_kernel import (
@@ -105,7 +105,7 @@ class Brain(NamedTuple):
     pots: NDArray[int64]  # [2]: how many there are, and 1 where chefs must pass things over counters
 
 
-@kernel
+@lean_kernel
 def task_of(kind: int) -> int:
     """The subtask of the value tables for a kind of subtask."""
     if kind in (TAKE_ONION, TAKE_TOMATO):
@@ -121,7 +121,7 @@ def task_of(kind: int) -> int:
     return PUT_DOWN if kind == DROP else IDLE
 
 
-@kernel
+@lean_kernel
 def _stand_of(held: int) -> int:
     if held == NOTHING:
         return AT_POT
@@ -130,7 +130,7 @@ def _stand_of(held: int) -> int:
     return WITH_DISH if held == 3 else WITH_SOUP
 
 
-@kernel
+@lean_kernel
 def world_of(spec: NDArray[int16], state: NDArray[int16], lying_soup: bool) -> int:
     """The world of the value tables that a state is in; a soup on a counter counts as one in a pot."""
     count = 0
@@ -148,21 +148,21 @@ def world_of(spec: NDArray[int16], state: NDArray[int16], lying_soup: bool) -> i
     return world(count, min(full, MOST_FULL), orders)
 
 
-@kernel
+@lean_kernel
 def pose_of(brain: Brain, state: NDArray[int16], seat: int) -> int:
     """The pose of a chef: 4 * floor number + facing."""
     chef = CHEF * seat
     return int(4 * brain.joint.floor_of[state[chef + CELL]] + state[chef + FACING])
 
 
-@kernel
+@lean_kernel
 def way_alone(brain: Brain, state: NDArray[int16], seat: int, cell: int) -> int:
     """The fewest actions of a chef to a tile, the other left out of account."""
     chef = CHEF * seat
     return int(brain.costs[4 * state[chef + CELL] + state[chef + FACING], cell])
 
 
-@kernel
+@lean_kernel
 def cooks_for(brain: Brain, state: NDArray[int16], cell: int) -> int:
     """The ticks until the soup in a full pot is ready; 0 for anything else."""
     packed = state[CELLS + cell]
@@ -171,7 +171,7 @@ def cooks_for(brain: Brain, state: NDArray[int16], cell: int) -> int:
     return int(brain.spec[SPEC_COOK_TIME] - packed // POT_TICKS)
 
 
-@kernel
+@lean_kernel
 def pair_cost(brain: Brain, state: NDArray[int16], seat: int, mine: int, others: int) -> int:
     """The ticks until both chefs face their tiles (-1: anywhere) by a joint plan; FAR if there is none."""
     goal = FREE if mine < 0 else 1 + mine
@@ -182,7 +182,7 @@ def pair_cost(brain: Brain, state: NDArray[int16], seat: int, mine: int, others:
     return joint_cost(brain.joint, other, goal, pose0, pose1)
 
 
-@kernel
+@lean_kernel
 def _cost_to_go(
     brain: Brain, state: NDArray[int16], seat: int, kind: int, cell: int, human: int, human_cell: int
 ) -> float:
@@ -219,7 +219,7 @@ def _cost_to_go(
     )
 
 
-@kernel
+@lean_kernel
 def _rank(kind: int) -> int:
     """The ticks by which the state machine puts a kind of subtask behind others."""
     if kind == WAIT:
@@ -296,7 +296,7 @@ def choose(
     return best_kind, best_cell
 
 
-@kernel
+@lean_kernel
 def _toward(brain: Brain, state: NDArray[int16], seat: int, cell: int, human_cell: int) -> int:
     """The robot's part in the first tick of the joint plan to both tiles (-1: anywhere)."""
     mine, others = cell, human_cell
@@ -339,7 +339,7 @@ def robot_action(
     return action
 
 
-@kernel
+@lean_kernel
 def stuck(state: NDArray[int16], memory: NDArray[int16]) -> bool:
     """Whether someone tried to move and both chefs' cells and facings are as they were."""
     if not memory[KNOWN] or not _still(state, memory):
@@ -347,7 +347,7 @@ def stuck(state: NDArray[int16], memory: NDArray[int16]) -> bool:
     return bool(memory[ACTIONS_BEFORE] < STAY or memory[ACTIONS_BEFORE + 1] < STAY)
 
 
-@kernel
+@lean_kernel
 def _still(state: NDArray[int16], memory: NDArray[int16]) -> bool:
     return bool(
         state[CELL] == memory[POSES]

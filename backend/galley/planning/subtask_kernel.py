@@ -31,7 +31,7 @@ from galley.kitchen.codes import (
     TOMATO,
     TOMATO_DISPENSER,
 )
-from galley.planning.compiling import kernel
+from galley.planning.compiling import lean_kernel
 from galley.planning.myopic_kernel import (
     drop_at,
     free_counter,
@@ -57,7 +57,7 @@ NEAREST = 3
 """Of the tiles where a subtask can be done, those considered."""
 
 
-@kernel
+@lean_kernel
 def add_tile(out: NDArray[int16], kind: int, cell: int, costs: NDArray[int16]) -> None:
     """Nothing; `cell` becomes one of the nearest tiles of a subtask if it is."""
     if cell < 0 or costs[cell] < 0:
@@ -75,7 +75,7 @@ def add_tile(out: NDArray[int16], kind: int, cell: int, costs: NDArray[int16]) -
     row[0] = min(count + 1, NEAREST)
 
 
-@kernel
+@lean_kernel
 def add_sources(
     spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], costs: NDArray[int16], seat: int,
     thing: int, unshared: bool, kind: int, out: NDArray[int16],
@@ -97,7 +97,7 @@ def add_sources(
             add_tile(out, kind, cell, costs)
 
 
-@kernel
+@lean_kernel
 def _with_empty_hands(
     spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], costs: NDArray[int16], seat: int,
     wanted: int, out: NDArray[int16],
@@ -122,7 +122,7 @@ def _with_empty_hands(
             add_sources(spec, state, reach, costs, seat, kind, True, task, out)
 
 
-@kernel
+@lean_kernel
 def subtasks(
     spec: NDArray[int16], all_costs: NDArray[int16], reach: NDArray[bool_], state: NDArray[int16], seat: int,
     out: NDArray[int16],
@@ -171,7 +171,7 @@ def subtasks(
         add_tile(out, DROP, drop_at(spec, state, reach, costs, seat), costs)
 
 
-@kernel
+@lean_kernel
 def kind_at(spec: NDArray[int16], held: int, cell: int) -> int:
     """The subtask of a chef with this in hand who means to interact with the tile at `cell` (-1: none)."""
     if cell < 0:
@@ -192,7 +192,7 @@ def kind_at(spec: NDArray[int16], held: int, cell: int) -> int:
     return FETCH if held == DISH else FILL
 
 
-@kernel
+@lean_kernel
 def kind_of(spec: NDArray[int16], state: NDArray[int16], seat: int, cell: int) -> int:
     """The subtask that a chef is at who means to interact with the tile at `cell` (-1: none)."""
     held = state[CHEF * seat + HELD]

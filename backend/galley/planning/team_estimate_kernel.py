@@ -25,7 +25,7 @@ from galley.kitchen.codes import (
     SPEC_TILES,
     TOMATO,
 )
-from galley.planning.compiling import kernel
+from galley.planning.compiling import lean_kernel
 from galley.planning.joint_kernel import FAR
 from galley.planning.myopic_kernel import open_order, pot_room, wanted_kind
 from galley.planning.robot_kernel import Brain, cooks_for, task_of, way_alone, world_of
@@ -51,7 +51,7 @@ STAGE_TICKS = 3.5
 """What a step on a thing's way from dispenser to pot is taken to cost where things pass over counters."""
 
 
-@kernel
+@lean_kernel
 def _pass_counters(
     brain: Brain, state: NDArray[int16], seat: int, out: NDArray[int16], summed: NDArray[int16]
 ) -> None:
@@ -68,7 +68,7 @@ def _pass_counters(
                 add_tile(out, DROP, cell, summed)
 
 
-@kernel
+@lean_kernel
 def team_options(
     brain: Brain, state: NDArray[int16], seat: int, orders: int, thorough: bool, out: NDArray[int16],
     summed: NDArray[int16],
@@ -91,7 +91,8 @@ def team_options(
     dishes = int(others == DISH)
     if others > SOUP_OF_KIND:
         soups += 1
-    room = np.zeros(3, dtype=np.int64)
+    onion_room = 0
+    tomato_room = 0
     for cell in range(costs.size):
         tile = spec[SPEC_TILES + cell]
         packed = state[CELLS + cell]
@@ -99,10 +100,10 @@ def team_options(
             count = packed // POT_COUNT % POT_COUNT
             soups += count == INGREDIENTS_PER_SOUP
             begun += count > 0
-            for kind in (ONION, TOMATO):
-                if count == INGREDIENTS_PER_SOUP:
-                    packed = 0  # the next soup's ingredients may be taken ahead
-                room[kind] += pot_room(packed, wanted, kind, any_order)
+            if count == INGREDIENTS_PER_SOUP:
+                packed = 0  # the next soup's ingredients may be taken ahead
+            onion_room += pot_room(packed, wanted, ONION, any_order)
+            tomato_room += pot_room(packed, wanted, TOMATO, any_order)
         elif tile == COUNTER and packed > SOUP_OF_KIND:
             soups += 1
     if held == NOTHING:
@@ -112,7 +113,8 @@ def team_options(
         if (max(begun, 1) if thorough else begun) > dishes:
             add_sources(spec, state, reach, costs, seat, DISH, False, TAKE_DISH, out)
         for kind in (ONION, TOMATO):
-            if room[kind] > (others == kind and not thorough) and soups < orders:
+            room = onion_room if kind == ONION else tomato_room
+            if room > (others == kind and not thorough) and soups < orders:
                 add_sources(
                     spec, state, reach, costs, seat, kind, False,
                     TAKE_ONION if kind == ONION else TAKE_TOMATO, out,
@@ -140,7 +142,7 @@ def team_options(
                 add_tile(out, DROP, cell, costs)
 
 
-@kernel
+@lean_kernel
 def _left(brain: Brain, state: NDArray[int16], seat: int, cell: int) -> float:
     """The ticks that a chef alone needs to do something useful with the tile at `cell`."""
     wait = cooks_for(brain, state, cell)
@@ -149,7 +151,7 @@ def _left(brain: Brain, state: NDArray[int16], seat: int, cell: int) -> float:
     return float(max(way_alone(brain, state, seat, cell), wait) + 1)
 
 
-@kernel
+@lean_kernel
 def must_wait(brain: Brain, state: NDArray[int16], seat: int, cell: int) -> bool:
     """Whether interacting with the tile does nothing yet: a soup still cooks, or a pot is still full."""
     if brain.spec[SPEC_TILES + cell] != POT:
@@ -160,7 +162,7 @@ def must_wait(brain: Brain, state: NDArray[int16], seat: int, cell: int) -> bool
     return bool(full)
 
 
-@kernel
+@lean_kernel
 def _stages(brain: Brain, state: NDArray[int16], orders: int) -> float:
     """A cost to go where things pass over counters: the steps left on the way of each thing needed."""
     spec = brain.spec
@@ -228,7 +230,7 @@ def _stages(brain: Brain, state: NDArray[int16], orders: int) -> float:
     return max(stages * STAGE_TICKS / 2 + near, last)
 
 
-@kernel
+@lean_kernel
 def to_go(
     brain: Brain, state: NDArray[int16], orders: int, beyond: int, thorough: bool, options: NDArray[int16],
     summed: NDArray[int16],
@@ -253,7 +255,7 @@ def to_go(
     return best if best < np.inf else STRANDED_TICKS
 
 
-@kernel
+@lean_kernel
 def pair_to_go(
     brain: Brain,
     state: NDArray[int16],

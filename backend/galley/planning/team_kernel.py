@@ -21,8 +21,8 @@ from galley.kitchen.codes import (
     TICK,
 )
 from galley.kitchen.rules import finished, step
-from galley.planning.compiling import kernel
-from galley.planning.joint_kernel import FAR, FREE, MOST_POSES, joint_cost, joint_step, step_with_way
+from galley.planning.compiling import kernel, lean_kernel
+from galley.planning.joint_kernel import FAR, FREE, MOST_POSES, joint_cost, known_step
 from galley.planning.robot_kernel import Brain, pose_of, way_alone
 from galley.planning.subtask_kernel import (
     KINDS,
@@ -51,7 +51,7 @@ class Search(NamedTuple):
     times: NDArray[int16]  # [K], when first
 
 
-@kernel
+@lean_kernel
 def walk(
     brain: Brain, state: NDArray[int16], cell0: int, cell1: int, wait0: bool, wait1: bool, end0: int,
     end1: int, first: int, leg: NDArray[uint8], out: NDArray[int32],
@@ -81,10 +81,7 @@ def walk(
             way = 2
         if way == 2 and blocked:
             way = 0 if at0 or not at1 else 1
-        if way == 2:
-            code = joint_step(brain.joint, brain.costs, goal0, goal1, pose0, pose1, 0)
-        else:
-            code = step_with_way(brain.joint, brain.costs, goal0, goal1, way, pose0, pose1)
+        code = known_step(brain.joint, brain.costs, goal0, goal1, way, pose0, pose1)
         act0, act1 = code // 8, code % 8
         if does0:
             act0 = INTERACT
@@ -106,7 +103,7 @@ def walk(
     return 0
 
 
-@kernel
+@lean_kernel
 def _key(state: NDArray[int16]) -> uint64:
     """A hash of everything in a state but the tick."""
     word = uint64(1469598103934665603)
@@ -117,7 +114,7 @@ def _key(state: NDArray[int16]) -> uint64:
     return word | uint64(1)
 
 
-@kernel
+@lean_kernel
 def _met_before(search: Search, key: uint64, tick: int) -> bool:
     """Whether a state was met no later than at `tick`; notes it otherwise."""
     size = search.keys.size
@@ -136,7 +133,7 @@ def _met_before(search: Search, key: uint64, tick: int) -> bool:
     return False
 
 
-@kernel
+@lean_kernel
 def _place(search: Search, tick: int, total: float) -> int:
     """The number of the node that a new one of this estimate takes at a tick, -1 if none is worse."""
     width = search.parents.size // search.counts.size
@@ -246,7 +243,7 @@ def search_plan(
     return best_node, False
 
 
-@kernel
+@lean_kernel
 def _rate_pairs(
     brain: Brain, state: NDArray[int16], orders: int, options: NDArray[int16], rated: NDArray[float64],
     which: NDArray[int64], summed: NDArray[int16], ahead: NDArray[int16],

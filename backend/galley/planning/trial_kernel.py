@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from galley.kitchen.codes import INTERACT, TICK
 from galley.kitchen.rules import finished, reset
-from galley.planning.compiling import kernel
+from galley.planning.compiling import kernel, lean_kernel
 from galley.planning.draw_kernel import draw
 from galley.planning.myopic_kernel import MEMORY_SIZE, decide, remember
 from galley.planning.robot_kernel import ROBOT_MEMORY, Brain, robot_action, robot_observe
@@ -25,7 +25,7 @@ NOISY_ACTION = 2
 LENGTH = 3
 
 
-@kernel
+@lean_kernel
 def _myopic(
     brain: Brain, state: NDArray[int16], seat: int, seed: uint64, epsilon: float, memory: NDArray[int16]
 ) -> int:

@@ -18,7 +18,7 @@ from numpy import float32, float64
 from numpy.typing import NDArray
 
 from galley.kitchen.codes import INGREDIENTS_PER_SOUP
-from galley.planning.compiling import kernel
+from galley.planning.compiling import lean_kernel
 
 # What a chef is at.
 IDLE = 0
@@ -52,13 +52,13 @@ PRECISION = 0.25
 """Value iteration ends when no cost changes by as many ticks."""
 
 
-@kernel
+@lean_kernel
 def world(count: int, full: int, orders: int) -> int:
     """The number of (ingredients in the pot being filled, soups cooking or ready, orders remaining)."""
     return (count * (MOST_FULL + 1) + full) * MOST_ORDERS + orders - 1
 
 
-@kernel
+@lean_kernel
 def done(task: int, at: int, pots: int) -> tuple[int, int]:
     """(stand, world) after a subtask; world -1 when the last order is served."""
     orders = at % MOST_ORDERS + 1
@@ -91,7 +91,7 @@ def done(task: int, at: int, pots: int) -> tuple[int, int]:
     return stand, world(count, full, orders)
 
 
-@kernel
+@lean_kernel
 def sensible(stand: int, task: int, at: int, pots: int, other: int, team: bool) -> bool:
     """Whether a subtask makes sense while the other chef is at `other`; a team takes things ahead."""
     full = at // MOST_ORDERS % (MOST_FULL + 1)
@@ -108,12 +108,12 @@ def sensible(stand: int, task: int, at: int, pots: int, other: int, team: bool) 
     return task == TAKE_A_DISH and full + (team and count > 0) > (other == FETCH_SOUP)
 
 
-@kernel
+@lean_kernel
 def _step(ticks: float, unit: float) -> int:
     return min(LEFTS - 1, int(ticks / unit + 0.5))
 
 
-@kernel
+@lean_kernel
 def both_busy(
     robot: int, robot_left: float, human: int, human_left: float, at: int, pots: int, unit: float,
     robot_next: NDArray[float32], human_next: NDArray[float32],
@@ -130,7 +130,7 @@ def both_busy(
     return human_left + human_next[robot, _step(robot_left - human_left, unit), stand, then]
 
 
-@kernel
+@lean_kernel
 def robot_waits(
     stand: int, human: int, human_left: float, at: int, pots: int, unit: float,
     durations: NDArray[float64], robot_next: NDArray[float32], team: bool,
@@ -154,7 +154,7 @@ def robot_waits(
     return ticks + (least if team else total / ways)
 
 
-@kernel
+@lean_kernel
 def iterate(
     robot_takes: NDArray[float64], human_takes: NDArray[float64], pots: int, unit: float,
     robot_next: NDArray[float32], human_next: NDArray[float32], team: bool,
