@@ -68,6 +68,16 @@ def test_every_tick_shows_the_kitchen_as_the_rules_have_it() -> None:
             assert document["steps"][tick]["actions"] == list(actions[tick])
 
 
+def test_a_partner_is_seen_unless_the_round_was_played_alone() -> None:
+    def partner(agent: str, hat: str | None) -> str:
+        seats = (SeatRow(0, None, None, agent, "a" * 64, hat), SeatRow(1, 7, "rounds-1", hat="blue"))
+        document = replay_document(row([(4, 4)], seats=seats), {})
+        return str(document["frames"][0]["board"]["partner"])
+
+    assert partner("stay", None) == "none"
+    assert partner("stay", "orange") == partner("chef-a", None) == "agent"
+
+
 def test_score_and_events_are_there() -> None:
     document = replay_document(row(one_soup()), {})
     assert (document["score"], document["ticks"], document["whole"]) == (20, 40, 40)

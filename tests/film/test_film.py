@@ -18,7 +18,7 @@ from galley.film.footage import Footage, Reel, footage
 from galley.film.painter import Painter
 from galley.film.write import frames, write_film
 from galley.kitchen import EAST, INTERACT, NORTH, SOUTH, STAY, WEST, Layout
-from galley.kitchen.trajectory import HUMAN, Seat, Trajectory, write
+from galley.kitchen.trajectory import HUMAN, NOBODY, Seat, Trajectory, write
 from galley.workspace import frontend_folder
 
 SPRITES = frontend_folder() / "sprites"
@@ -118,6 +118,14 @@ def test_only_a_lone_participant_gets_a_ring() -> None:
     ]
     under = (0.9, 1.75, 1.4, 2.1)
     assert share(both[0], "#ffffff", under) > share(both[1], "#ffffff", under) + 0.05
+
+
+def test_who_was_not_there_is_not_drawn() -> None:
+    alone = footage([trajectory(seats=(HUMAN, NOBODY))], "it")
+    picture = Painter(alone, SPRITES, TILE).paint(Reel(alone).at(0))
+    assert share(picture, "#0072B2", (1, 0.6, 2, 2)) > 0.05
+    assert share(picture, "#E69F00", (3, 0.6, 4, 2)) == 0
+    assert alone.own == 0
 
 
 def test_a_chef_glides_from_cell_to_cell() -> None:

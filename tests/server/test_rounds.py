@@ -6,9 +6,11 @@ from collections.abc import Iterator
 
 import pytest
 
-from galley.records import queries
+from galley.records import overview, queries
+from galley.records.films import footage_of_round
 from galley.records.tables import ABSENCES
 from galley.records.verify import verify_study
+from galley.server.admin.replaying import replay_document
 from tests.server.helpers import Participant, Served, serving
 from tests.server.test_flow import row_of
 from tests.study.workspaces import study_workspace
@@ -51,6 +53,21 @@ def at_the_rounds(served: Served) -> Participant:
     person.load()
     assert row_of(person).step_index == 2
     return person
+
+
+def test_nobody_is_seen_in_the_replay_or_the_film_of_a_round_played_alone(served: Served) -> None:
+    visit = row_of(at_the_rounds(served))
+    practice = served.store.open_round(visit.id, "tutorial").result()
+    with_agent = served.store.open_round(visit.id, "rounds-1").result()
+    assert practice is not None
+    assert with_agent is None, "it begins with its first connection"
+    assert [seat.kind for seat in served.store.trajectory(practice.id).seats] == ["human", "nobody"]
+    assert footage_of_round(served.store, practice.id).drawn == (0,)
+    board = replay_document(practice, {})["frames"][0]["board"]
+    assert (board["seat"], board["partner"]) == (0, "none")
+    with served.store.reading() as connection:
+        (shown,) = overview.rounds(connection, "mine", visit_id=visit.id)
+    assert (shown.agents, len(shown.participants)) == ((), 1)
 
 
 def test_episodes_are_one_round_in_the_records_and_replay(served: Served) -> None:

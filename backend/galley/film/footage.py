@@ -12,7 +12,7 @@ from galley.kitchen.codes import TICK
 from galley.kitchen.events import Event
 from galley.kitchen.layout import Layout
 from galley.kitchen.state import KitchenView, view
-from galley.kitchen.trajectory import Replay, Trajectory, play
+from galley.kitchen.trajectory import NOBODY, Replay, Trajectory, play
 
 TICK_MS = 150
 USUAL_HATS = ("blue", "orange")
@@ -20,12 +20,16 @@ USUAL_HATS = ("blue", "orange")
 
 @dataclass(frozen=True, eq=False)
 class Footage:
-    """A round to be filmed. `own` is the seat that gets the participant's ring, None for no ring."""
+    """A round to be filmed. `own` is the seat that gets the participant's ring, None for no ring.
+
+    `drawn` are the seats whose chefs are seen.
+    """
 
     episodes: tuple[Replay, ...]
     tick_ms: float = TICK_MS
     hats: tuple[str, str] = USUAL_HATS
     own: int | None = None
+    drawn: tuple[int, ...] = (0, 1)
 
     @property
     def layout(self) -> Layout:
@@ -48,14 +52,16 @@ def footage(
 
     Raises: GalleyError, which calls the round `shown`, if nothing of it was played.
     """
-    humans = [seat for seat, who in enumerate(trajectories[0].seats) if who.kind == "human"]
+    seats = trajectories[0].seats
+    drawn = tuple(seat for seat, who in enumerate(seats) if who.kind != NOBODY.kind)
+    humans = [seat for seat, who in enumerate(seats) if who.kind == "human"]
     played = tuple(_played(one) for one in trajectories)
     one, other = hats
     first = one if one in HATS else _spare(other)
     second = other if other in HATS else _spare(first)
     if not any(len(episode.out) for episode in played):
         raise GalleyError(f"{shown}: no tick was played, so there is nothing to draw")
-    return Footage(played, tick_ms, (first, second), humans[0] if len(humans) == 1 else None)
+    return Footage(played, tick_ms, (first, second), humans[0] if len(humans) == 1 else None, drawn)
 
 
 def _spare(other: str | None) -> str:

@@ -44,7 +44,7 @@ class Painter:
         self._under(frame, moment)
         layers = [(place[1] + 0.0, "pot", place) for place in moment.kitchen.pots]
         layers += [(place[1] + 0.0, "thing", place) for place in moment.kitchen.things]
-        layers += [(moment.seen[seat][1] + 0.5, "chef", (seat, 0)) for seat in range(len(moment.seen))]
+        layers += [(moment.seen[seat][1] + 0.5, "chef", (seat, 0)) for seat in self._footage.drawn]
         for _, what, place in sorted(layers, key=lambda layer: layer[0]):
             if what == "pot":
                 self._pot(frame, place, moment.kitchen.pots[place])

@@ -26,7 +26,10 @@ FORMAT: Final = 1
 
 @dataclass(frozen=True)
 class Seat:
-    """Who controlled a chef: a human, or an agent by name and by the hash of its bundle."""
+    """Who controlled a chef: a human, or an agent by name and by the hash of its bundle; or nobody.
+
+    Nobody is on the other seat of a game played alone: that chef stands still and was not seen.
+    """
 
     kind: str
     name: str = ""
@@ -34,6 +37,7 @@ class Seat:
 
 
 HUMAN: Final = Seat("human")
+NOBODY: Final = Seat("nobody")
 
 
 @dataclass(frozen=True, eq=False)

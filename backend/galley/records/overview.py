@@ -13,6 +13,7 @@ from sqlalchemy import Connection, func, select
 
 from galley.records.arrivals import slots
 from galley.records.flags import Flag, flags
+from galley.records.replay import nobody
 from galley.records.tables import NOTES, RESPONSES, ROUNDS, SEATS, STAGES, STUDIES, TICKS, VISITS
 from galley.records.timeline import TimelineEntry, timeline
 
@@ -330,7 +331,7 @@ def rounds(
     )
     ids = [row["id"] for row in found]
     sitting = (
-        select(SEATS.c.round_id, SEATS.c.agent, SEATS.c.visit_id, VISITS.c.participant)
+        select(SEATS.c.round_id, SEATS.c.agent, SEATS.c.hat, SEATS.c.visit_id, VISITS.c.participant)
         .outerjoin(VISITS, VISITS.c.id == SEATS.c.visit_id)
         .where(SEATS.c.round_id.in_(ids))
         .order_by(SEATS.c.round_id, SEATS.c.seat)
@@ -346,7 +347,9 @@ def rounds(
         RoundSummary(
             **{name: row[name] for name in same},
             participants=tuple(seat.participant for seat in seats[row["id"]] if seat.participant is not None),
-            agents=tuple(seat.agent for seat in seats[row["id"]] if seat.agent is not None),
+            agents=tuple(
+                seat.agent for seat in seats[row["id"]] if seat.agent is not None and not nobody(seat)
+            ),
             ticks=ticks.get(row["id"], 0) if row["played_ticks"] is None else row["played_ticks"],
             ticks_whole=row["horizon_ticks"] * row["episodes"],
             visit_ids=tuple(seat.visit_id for seat in seats[row["id"]] if seat.visit_id is not None),

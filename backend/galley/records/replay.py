@@ -17,8 +17,9 @@ from galley.kitchen import Layout
 from galley.kitchen.codes import DELIVERIES, ORDERS_DELIVERED, OUT_REWARD, TICK
 from galley.kitchen.events import Event
 from galley.kitchen.measures import Measures, measures_of
-from galley.kitchen.trajectory import HUMAN, Replay, Seat, Trajectory, play
+from galley.kitchen.trajectory import HUMAN, NOBODY, Replay, Seat, Trajectory, play
 from galley.records.rows import RoundRow, SeatRow
+from galley.study.config import ALONE_AGENT
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +106,14 @@ def _episodes(layout: Layout, row: RoundRow) -> Iterator[NDArray[np.uint8]]:
     yield rest
 
 
+def nobody(seat: SeatRow) -> bool:
+    """Whether the chef of a seat was not seen: the round was played alone."""
+    return seat.agent == ALONE_AGENT and seat.hat is None
+
+
 def _seat(seat: SeatRow) -> Seat:
+    if nobody(seat):
+        return NOBODY
     return HUMAN if seat.agent is None else Seat("agent", seat.agent, seat.agent_sha256 or "")
 
 

@@ -267,7 +267,7 @@ SEATS = Table(
     _of("step_id", String(200), "the step of that visit's plan; empty as above", nullable=True),
     _of("agent", String(200), "name of the agent that plays here; empty for a person", nullable=True),
     _of("agent_sha256", String(64), "hash of the agent's bundle; empty for a person", nullable=True),
-    _of("hat", String(40), "colour of the hat", nullable=True),
+    _of("hat", String(40), "colour of the hat; empty for a chef that was not seen", nullable=True),
     _of("rtt_median_ms", Float, "median round-trip time, counted at the round's end", nullable=True),
     ForeignKeyConstraint(["visit_id"], ["visits.id"], ondelete="CASCADE"),
     UniqueConstraint("visit_id", "step_id"),

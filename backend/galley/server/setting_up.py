@@ -21,7 +21,8 @@ def of_one(
 ) -> NewRound:
     """The round of a visit's step, played with an agent."""
     seat = int(step.data["human_seat"])
-    partner = SeatRow(1 - seat, None, None, agent, sha256, step.data["partner_hat"])
+    hat = None if step.data["partner"] == "none" else step.data["partner_hat"]
+    partner = SeatRow(1 - seat, None, None, agent, sha256, hat)
     return _round(layouts, step, visit_id, partner, at_ms)
 
 

@@ -14,6 +14,7 @@ from galley.kitchen.codes import DELIVERIES, TICK
 from galley.kitchen.events import decode
 from galley.kitchen.trajectory import Replay, play
 from galley.records import RoundRow
+from galley.records.replay import nobody
 from galley.server.scene import Scene, happenings
 
 NO_HAT = "orange"
@@ -89,6 +90,7 @@ def _keyframe(
         "tick_ms": row.tick_ms,
         "seat": human,
         "hats": hats,
+        "partner": "none" if any(map(nobody, row.seats)) else "agent",
         "grid": scene.grid,
         "cook_time": scene.layout.rules.cook_time_ticks,
         "goal": None,
