@@ -202,7 +202,8 @@ def act_as_one(
             twin.ahead = (state.tobytes(), memory)
     barred = np.zeros(logits.shape, dtype=np.bool_)
     for row, (twin, state) in enumerate(zip(twins, states, strict=True)):
-        barred[row, twin.taken_while_stuck(state)] = True
+        if taken := twin.taken_while_stuck(state):
+            barred[row, taken] = True
     draws = None
     if first.sampling == "sample":
         seeds = np.array([twin.seed & _WORD for twin in twins], dtype=np.uint64)

@@ -80,12 +80,13 @@ def decode(
 
     `before` and `after` are the states int16[S] around the tick, `out` int32[4] is what the tick wrote.
     """
-    if not out[OUT_EVENTS:].any():
+    written = out.tolist()
+    if not any(written[OUT_EVENTS:]):
         return ()
     tick = int(before[TICK])
     events = []
     for seat in (0, 1):
-        mask = int(out[OUT_EVENTS + seat])
+        mask = written[OUT_EVENTS + seat]
         if not mask:
             continue
         facing = int(after[CHEF * seat + FACING])
@@ -102,7 +103,7 @@ def decode(
                 paid = kind == "delivery" and mask >> BIT_PAID & 1
                 reward = layout.rules.delivery_reward if paid else 0
                 events.append(Event(tick, seat, kind, name, place, x, y, reward))
-    ready = int(out[OUT_READY])
+    ready = written[OUT_READY]
     for number, place_ in enumerate(layout.pots):
         if ready >> number & 1:
             kind_code = int(after[CELLS + layout.cell(place_)]) % POT_COUNT

@@ -99,13 +99,14 @@ class ManyRows:
     """
 
     def __init__(self, engine: Engine, table: Table, kind: type[tuple[Any, ...]]) -> None:
-        self._new = insert_into(engine, table)
-        by_place = engine.dialect.paramstyle
-        self._dialect = type(engine.dialect)(paramstyle="qmark" if by_place == "qmark" else "format")
-        self._columns = [column.name for column in table.c]
+        new = insert_into(engine, table).on_conflict_do_nothing()
+        by_place = "qmark" if engine.dialect.paramstyle == "qmark" else "format"
+        kin: Any = type(engine.dialect)
+        text = str(new.compile(dialect=kin(paramstyle=by_place)))
+        self._head, values = text.split(" VALUES ")
+        self._one, self._tail = values.split(" ON CONFLICT ")
         fields: Sequence[str] = kind._fields  # type: ignore[attr-defined]
-        self._pick = itemgetter(*(fields.index(name) for name in self._columns if name != "round_id"))
-        self._texts: dict[int, str] = {}
+        self._pick = itemgetter(*(fields.index(column.name) for column in table.c if column.name in fields))
 
     def insert(self, connection: Connection, rows: Sequence[tuple[int, Any]]) -> None:
         """Insert rows, each with its round."""
@@ -121,8 +122,4 @@ class ManyRows:
         return tuple(chain.from_iterable((round_id, *pick(row)) for round_id, row in rows))
 
     def _text(self, count: int) -> str:
-        if count not in self._texts:
-            marks = [dict.fromkeys(self._columns)] * count
-            statement = self._new.values(marks).on_conflict_do_nothing()
-            self._texts[count] = str(statement.compile(dialect=self._dialect))
-        return self._texts[count]
+        return f"{self._head} VALUES {', '.join([self._one] * count)} ON CONFLICT {self._tail}"

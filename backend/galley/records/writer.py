@@ -96,7 +96,9 @@ class Writer:
             if not self._waiting:
                 self._flush_at = time.monotonic() + self._flush_every_s
                 self._jobs.put(None)
-            self._waiting.setdefault(round_id, Journal()).extend(rows)
+            there = self._waiting.setdefault(round_id, rows)
+            if there is not rows:
+                there.extend(rows)
             self._waiting_rows += len(rows)
 
     def hold(self, lease: Lease) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import gc
 import logging
 from collections.abc import AsyncIterator, Iterator, Mapping
 from contextlib import asynccontextmanager
@@ -23,6 +22,7 @@ from galley.kitchen.layout_file import load_layouts
 from galley.records import Store
 from galley.server.admin.pages import researcher_pages
 from galley.server.clock import Clock
+from galley.server.collecting import collect_between_rounds, few_collections
 from galley.server.lobby import Lobby
 from galley.server.matches import Matches
 from galley.server.origin import HEADERS, SecureHeaders
@@ -93,18 +93,17 @@ def create_app(workspace: Workspace, store: Store, settings: Settings, *, previe
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
         thinking.start()
-        # What is here now stays: the collector need not walk it again in the middle of a tick.
-        gc.collect()
-        gc.freeze()
-        watching = asyncio.create_task(time_limits.watch())
-        try:
-            yield
-        finally:
-            watching.cancel()
-            await matches.stop()
-            await asyncio.wrap_future(store.flush())
-            thinking.stop()
-            gc.unfreeze()
+        with few_collections():
+            watching = asyncio.create_task(time_limits.watch())
+            collecting = asyncio.create_task(collect_between_rounds(matches.playing))
+            try:
+                yield
+            finally:
+                watching.cancel()
+                collecting.cancel()
+                await matches.stop()
+                await asyncio.wrap_future(store.flush())
+                thinking.stop()
 
     app = FastAPI(title="Galley", docs_url=None, redoc_url=None, openapi_url=None, lifespan=lifespan)
     app.include_router(pages.router())

@@ -239,8 +239,9 @@ class Match:
         course = self.course
         tick = course.ticks
         deadline_s = self.deadline(tick)
+        people = self.people
         actions = [STAY, STAY]
-        for person in self.people:
+        for person in people:
             actions[person.seat] = person.keys.take()
         decision_ms, fault = None, None
         late = False
@@ -259,18 +260,18 @@ class Match:
         events = happenings(course.kitchen.events)
         text = wire.encode("tick", tick=course.kitchen.tick, events=events, **changes)
         handed = Handed()
-        for person in self.people:
+        for person in people:
             if person.connection is not None:
                 person.connection.send(text, handed)
         played = Played(tick, joint, deadline_s, self._loop.time(), handed, decision_ms, late, fault)
         self.journal.played(played)
-        if course.over:
-            self.end("finished")
-        elif course.between:
-            self._next_episode()
-        else:
+        if not course.kitchen.done:
             self._ask((before, joint))
             self._timer = self._loop.call_at(self.deadline(tick + 1), self._tick)
+        elif course.over:
+            self.end("finished")
+        else:
+            self._next_episode()
 
     def _next_episode(self) -> None:
         self.course.next_episode()

@@ -92,11 +92,17 @@ class Matches:
         # A database in a file has one serving process, so that nobody else can have its rounds.
         self._only_server = store.engine.dialect.name == "sqlite"
         self._live: dict[int, _Live] = {}
+        # Layouts and all that is derived from them are shared by the rounds played on them.
+        self._known: dict[Layout, Layout] = {}
         self._round_of: dict[int, tuple[str, int]] = {}
         self._locks: WeakValueDictionary[tuple[str, int], asyncio.Lock] = WeakValueDictionary()
 
     def __len__(self) -> int:
         return len(self._live)
+
+    def playing(self) -> bool:
+        """Whether a round is in play, or about to be."""
+        return any(live.match.phase in ("countdown", "playing") for live in self._live.values())
 
     async def of(self, visit: Visit) -> Place | None:
         """The place in the round that a visit is at; None when it is at none, or its round is over already.
@@ -277,7 +283,8 @@ class Matches:
 
     async def _make(self, visit: Visit, row: RoundRow, lease: Lease | None) -> Match:
         data, config = visit.step.data, visit.study.config
-        layout = Layout.from_dict(json.loads(row.layout_json))
+        drawn = Layout.from_dict(json.loads(row.layout_json))
+        layout = self._known.setdefault(drawn, drawn)
         seeds = tuple(data["seeds"]) if data["seed"] == row.seed else (row.seed,) * row.episodes
         spec = RoundSpec(
             round_id=row.id,

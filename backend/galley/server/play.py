@@ -136,12 +136,15 @@ class Play:
         hello_by_s = loop.time() + HELLO_WITHIN_S
         last_seq = -1
         while True:
-            try:
-                async with asyncio.timeout_at(hello_by_s if socket.place is None else None):
-                    event = await websocket.receive()
-            except TimeoutError:
-                socket.close(wire.CLOSE_REFUSED)
-                return LEFT
+            if socket.place is not None:
+                event = await websocket.receive()
+            else:
+                try:
+                    async with asyncio.timeout_at(hello_by_s):
+                        event = await websocket.receive()
+                except TimeoutError:
+                    socket.close(wire.CLOSE_REFUSED)
+                    return LEFT
             if event["type"] == "websocket.disconnect":
                 return RESTART if event.get("code") == SERVICE_RESTART else LEFT
             arrival_s = loop.time()

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from operator import ne
 from typing import Any
 
-import numpy as np
+from numpy import int16
 from numpy.typing import NDArray
 
 from galley.kitchen import Event, Layout
@@ -21,7 +22,7 @@ from galley.kitchen.codes import (
 )
 from galley.kitchen.state import unpack_pot
 
-State = NDArray[np.int16]
+State = NDArray[int16]
 
 
 class Scene:
@@ -32,51 +33,54 @@ class Scene:
         self.grid = [row.replace("1", " ").replace("2", " ") for row in layout.grid]
         self._pots = {layout.cell(place) for place in layout.pots}
         self._counters = [layout.cell(place) for place in layout.counters]
+        self._places = [layout.place(cell) for cell in range(layout.tiles.size)]
+        self._reward = layout.rules.delivery_reward
 
     def chefs(self, state: State) -> list[list[int]]:
         """Seat 0 and seat 1 as [x, y, facing, held]."""
-        row = state[: 2 * CHEF].tolist()
-        return [[*self.layout.place(row[at + CELL]), row[at + FACING], row[at + HELD]] for at in (0, CHEF)]
+        return self._chefs(state[: 2 * CHEF].tolist())
 
     def whole(self, state: State, score_before: int = 0) -> dict[str, Any]:
         """The parts of a keyframe that the state decides, orders included.
 
         `score_before` are the points of earlier episodes.
         """
-        cells = state[CELLS:].tolist()
+        row = state.tolist()
+        cells = row[CELLS:]
         orders = self.layout.rules.orders
         return {
-            "chefs": self.chefs(state),
+            "chefs": self._chefs(row),
             "things": [self._thing(cell, cells[cell]) for cell in self._counters if cells[cell]],
             "pots": [self._pot(cell, cells[cell]) for cell in sorted(self._pots)],
-            "score": score_before + self.score(state),
-            "orders": None if orders is None else list(orders[int(state[ORDERS_DELIVERED]) :]),
+            "score": score_before + row[DELIVERIES] * self._reward,
+            "orders": None if orders is None else list(orders[row[ORDERS_DELIVERED] :]),
         }
 
     def changes(self, before: State, after: State, score_before: int = 0) -> dict[str, Any]:
         """The parts of a tick message that the states around it decide; `score_before` as in `whole`."""
         things: list[list[int]] = []
         pots: list[list[int | bool]] = []
-        for cell in np.flatnonzero(before[CELLS:] != after[CELLS:]).tolist():
-            value = int(after[CELLS + cell])
-            if cell in self._pots:
-                pots.append(self._pot(cell, value))
-            else:
-                things.append(self._thing(cell, value))
-        score = score_before + self.score(after)
-        return {"chefs": self.chefs(after), "things": things, "pots": pots, "score": score}
+        # As lists, for rows this short are read sooner than arrays are.
+        old, new = before.tolist(), after.tolist()
+        cells = new[CELLS:]
+        for cell, changed in enumerate(map(ne, old[CELLS:], cells)):
+            if changed and cell in self._pots:
+                pots.append(self._pot(cell, cells[cell]))
+            elif changed:
+                things.append(self._thing(cell, cells[cell]))
+        score = score_before + new[DELIVERIES] * self._reward
+        return {"chefs": self._chefs(new), "things": things, "pots": pots, "score": score}
 
-    def score(self, state: State) -> int:
-        """Points so far."""
-        return int(state[DELIVERIES]) * self.layout.rules.delivery_reward
+    def _chefs(self, row: list[int]) -> list[list[int]]:
+        return [[*self._places[row[at + CELL]], row[at + FACING], row[at + HELD]] for at in (0, CHEF)]
 
     def _thing(self, cell: int, thing: int) -> list[int]:
-        return [*self.layout.place(cell), thing]
+        return [*self._places[cell], thing]
 
     def _pot(self, cell: int, packed: int) -> list[int | bool]:
         kind, count, ticks = unpack_pot(packed)
         ready = count == INGREDIENTS_PER_SOUP and ticks >= self.layout.rules.cook_time_ticks
-        return [*self.layout.place(cell), kind, count, ticks, ready]
+        return [*self._places[cell], kind, count, ticks, ready]
 
 
 def happenings(events: Iterable[Event]) -> list[list[Any]]:

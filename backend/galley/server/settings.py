@@ -34,7 +34,7 @@ SETTINGS: tuple[Setting, ...] = (
     Setting(
         "think_window_ms",
         "THINK_WINDOW_MS",
-        "How long agents' decisions are gathered into a batch, ms.",
+        "How far apart batches of agents' decisions begin at least, ms.",
         0,
         50,
     ),
@@ -61,7 +61,7 @@ class Settings:
     database: str = ""
     reached_at: str = ""
     study: str = ""
-    think_window_ms: int = 1
+    think_window_ms: int = 10
     max_form_kib: int = 256
     messages_per_s: int = 200
     log_level: str = "warning"

@@ -105,10 +105,15 @@ class Unable:
 
 
 class Thinking:
-    """Owns the thinking thread: `start` it, `mind` for each round's agent, `stop` it."""
+    """Owns the thinking thread: `start` it, `mind` for each round's agent, `stop` it.
 
-    def __init__(self, window_s: float = 0.001) -> None:
+    Batches begin at least `window_s` apart: a question that comes alone is answered at once, and the more
+    rounds there are the more of them share a batch.
+    """
+
+    def __init__(self, window_s: float = 0.01) -> None:
         self._window_s = window_s
+        self._began_s = 0.0
         self._work: SimpleQueue[Question | Callable[[], None] | None] = SimpleQueue()
         self._thread: threading.Thread | None = None
 
@@ -148,8 +153,11 @@ class Thinking:
     def _run(self) -> None:
         while True:
             batch = [self._work.get()]
-            if self._window_s > 0 and isinstance(batch[0], Question):
-                time.sleep(self._window_s)
+            if isinstance(batch[0], Question):
+                now_s = time.monotonic()
+                if (wait_s := self._began_s + self._window_s - now_s) > 0:
+                    time.sleep(wait_s)
+                self._began_s = max(now_s, self._began_s + self._window_s)
             try:
                 while True:
                     batch.append(self._work.get_nowait())
