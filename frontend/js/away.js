@@ -2,6 +2,9 @@
 
 const { away = "", step = "" } = document.body.dataset;
 
-document.addEventListener("visibilitychange", () => {
+function tell() {
   navigator.sendBeacon(away, new URLSearchParams({ step, hidden: document.hidden ? "1" : "0" }));
-});
+}
+
+document.addEventListener("visibilitychange", tell);
+if (document.hidden) tell();

@@ -9,6 +9,7 @@ from typing import Any
 from sqlalchemy import Connection, Table, func, insert, select, update
 
 from galley.errors import GalleyError
+from galley.records.absences import back_on_page
 from galley.records.engine import insert_into
 from galley.records.queries import visit_row
 from galley.records.rows import VisitRow
@@ -67,7 +68,8 @@ def meet(connection: Connection, study: str) -> None:
 
 
 def enter_step(connection: Connection, visit_id: int, step_id: str, at_ms: int) -> None:
-    """Count a view of a step; the first one says when it was entered."""
+    """Count a view of a step; the first one says when it was entered. A page that was hidden is left."""
+    back_on_page(connection, visit_id, at_ms)
     new = insert_into(connection.engine, STAGES).values(
         visit_id=visit_id, step_id=step_id, entered_ms=at_ms, left_ms=None, views=1
     )

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from concurrent.futures import Future
 from typing import Any
 
-from galley.records import arrivals, jobs, queries
+from galley.records import absences, arrivals, jobs, queries
 from galley.records.arrivals import Allocate, Plan
 from galley.records.rows import Arrival, Begun, VisitRow
 from galley.records.store_base import StoreBase
@@ -154,6 +154,14 @@ class VisitStore(StoreBase):
         return self.write(
             lambda connection: jobs.hidden(connection, visit_id, step_id, round(started_ms), end)
         )
+
+    def left_page(self, visit_id: int, step_id: str, at_ms: float) -> Future[None]:
+        """Note that the page of a step was hidden; the next page, or `back_on_page`, ends that."""
+        return self.write(lambda connection: absences.left_page(connection, visit_id, step_id, round(at_ms)))
+
+    def back_on_page(self, visit_id: int, at_ms: float) -> Future[None]:
+        """Note that a page is seen again."""
+        return self.write(lambda connection: absences.back_on_page(connection, visit_id, round(at_ms)))
 
     def add_note(self, visit_id: int, author: str, text: str, at_ms: float) -> Future[int]:
         """The id of a researcher's new note about a visit."""

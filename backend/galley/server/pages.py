@@ -101,6 +101,7 @@ class Pages:
         router.add_api_route("/s/{study}/begin", self.begin, methods=["POST"], **shown)
         router.add_api_route("/v/{token}", self.visit, methods=["GET", "HEAD"], **shown)
         router.add_api_route("/v/{token}", self.submit, methods=["POST"], **shown)
+        router.add_api_route("/v/{token}/away", self.away, methods=["POST"], response_model=None)
         router.add_api_route("/v/{token}/lobby", self.waiting, methods=["GET"], response_model=None)
         return router
 
@@ -198,6 +199,19 @@ class Pages:
             meeting = await self._lobby.see(visit)
         answer = {"waiting": meeting.waiting, "seconds_left": meeting.seconds_left}
         return JSONResponse(answer, 200, NEVER_CACHED)
+
+    async def away(self, request: Request, token: str) -> Response:
+        """Note that a page was hidden or is seen again; for scripts, which read no answer."""
+        visit = await self._visits.find(token)
+        if visit is None or not same_origin(request.headers):
+            return Response(status_code=404 if visit is None else 403, headers=NEVER_CACHED)
+        try:
+            form = await read_form(request, self._max_form_bytes)
+        except FormError as error:
+            return Response(status_code=error.status, headers=NEVER_CACHED)
+        if visit.active and form.get("step") == [visit.step.id] and visit.step.kind != "round":
+            await self._visits.hidden(visit, hidden=form.get("hidden") == ["1"])
+        return Response(status_code=204, headers=NEVER_CACHED)
 
     async def submit(self, request: Request, token: str) -> Response:
         """Move on by what the step's form says; a form of another step changes nothing."""

@@ -56,6 +56,7 @@ def common_context(visit: Visit, now_ms: float) -> dict[str, Any]:
         "language": visit.row.language,
         "test": visit.row.test,
         "seconds_left": None if left_s is None else max(0, math.ceil(left_s)),
+        "away": f"{visit.url}/away" if visit.active and visit.step.kind != "round" else None,
         "visit_seconds_left": None if whole_s is None else max(0, math.ceil(whole_s)),
         "wait_s": math.ceil(visit.wait_s(now_ms)),
         "skippable": visit.step.skippable,

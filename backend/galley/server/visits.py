@@ -225,6 +225,14 @@ class Visits:
         """Note that the page of the visit's step is sent."""
         await asyncio.wrap_future(self._store.enter_step(visit.row.id, visit.step.id, self._clock.ms()))
 
+    async def hidden(self, visit: Visit, *, hidden: bool) -> None:
+        """Note that the page of the visit's step was hidden, or is seen again."""
+        now_ms = self._clock.ms()
+        if hidden:
+            await asyncio.wrap_future(self._store.left_page(visit.row.id, visit.step.id, now_ms))
+        else:
+            await asyncio.wrap_future(self._store.back_on_page(visit.row.id, now_ms))
+
     def overdue(self, visit: Visit, grace_s: float = 0.0) -> Happening | None:
         """What the passing of time does to a visit, or did `grace_s` ago; None while no limit has passed."""
         if not visit.active:
