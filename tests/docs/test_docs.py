@@ -66,9 +66,9 @@ def galley_mistake(line: str) -> str | None:
     """What is wrong with a `galley` line, if anything."""
     known = dict(reference.commands())
     words = shlex.split(line.replace("|", " "))
-    path = next((" ".join(words[:n]) for n in (3, 2) if " ".join(words[:n]) in known), None)
+    path = next((" ".join(words[:n]) for n in (4, 3, 2) if " ".join(words[:n]) in known), None)
     if path is None:
-        groups = {" ".join(name.split()[:2]) for name in known}
+        groups = {" ".join(name.split()[:n]) for name in known for n in (2, 3) if len(name.split()) > n}
         is_group = " ".join(words) in groups or words[1:] in (["--help"], ["--version"], ["<noun>", "<verb>"])
         return None if is_group else "no such command"
     flags = {p.flag for p in reference.parameters(known[path])} | {"--help"}

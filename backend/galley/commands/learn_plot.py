@@ -85,9 +85,10 @@ def matrices(
     layout: LayoutOption = None,
     agent: AgentsOption = None,
 ) -> None:
-    """Draw payoffs and preference centralities as squares, a row for each table (as Fig. 2b, 10)."""
+    """Draw payoffs and preference centralities as squares (as Fig. 2b, 10); print the mean of the newest."""
     _require_drawing(out)
     from galley.learning.evaluation.entries import entries
+    from galley.learning.graph import centrality_matrix, newest_centralities
     from galley.learning.plots.matrices import draw_matrices
     from galley.learning.plots.sources import read_payoffs
     from galley.learning.plots.style import save
@@ -98,6 +99,10 @@ def matrices(
         for file in one.members
     ]
     save(draw_matrices(found), out)
+    for title, table in found:
+        newest = newest_centralities(centrality_matrix(table.payoffs()))
+        if len(newest):
+            typer.echo(f"{title}: mean preference centrality of {len(newest)} newest {newest.mean():.3f}")
 
 
 @app.command()

@@ -258,6 +258,8 @@ def test_every_command_draws(tmp_path: Path) -> None:
         assert done.exit_code == 0, done.output or done.exception
         assert out.read_bytes().startswith(b"<?xml")
         out.unlink()
+    done = plot("matrices", f"COLE={tmp_path / 'p.npz'}", "--out", str(out))
+    assert done.stdout == "COLE: mean preference centrality of 3 newest 0.667\n"
 
 
 @pytest.mark.parametrize(
