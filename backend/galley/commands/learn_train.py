@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import time
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
@@ -11,7 +10,6 @@ from typing import Annotated, Any
 import typer
 
 from galley.commands.options import WorkspaceOption
-from galley.errors import GalleyError
 
 
 class Method(StrEnum):
@@ -48,6 +46,10 @@ def train(
         int | None,
         typer.Option(metavar="N", help="PBT, FCP, MEP: policies in the population.", show_default="3, 8, 5"),
     ] = None,
+    pool: Annotated[
+        list[str] | None,
+        typer.Option(metavar="RUN", help="FCP: a finished self-play run for the population, once each."),
+    ] = None,
     no_wpg: Annotated[
         bool, typer.Option("--no-wpg", help="COLE: leave the weighted PageRank out (ablation).")
     ] = False,
@@ -78,8 +80,8 @@ def train(
 
     from galley.kitchen.layout_file import find_layout
     from galley.learning.methods import Asked, described, machine_of, make, parsed_changes
-    from galley.learning.populations.cole import ColeSettings
     from galley.learning.policy import use_threads
+    from galley.learning.populations.cole import ColeSettings
     from galley.learning.run_folder import RunFolder
     from galley.learning.training import run
     from galley.workspace import Workspace
@@ -98,6 +100,7 @@ def train(
         generations=generations,
         generation_updates=generation_updates,
         population=population,
+        pool=tuple(pool or ()),
         changes=parsed_changes(set_ or ()),
         threads=threads or os.cpu_count() or 1,
         device=device,
@@ -118,3 +121,22 @@ def train(
         )
     folder.keep("best", policy)
     typer.echo(f"{path}: done; make an agent of it with: galley learn export {path} --name {method.value}")
+
+
+def export(
+    runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="Folders of finished runs.")],
+    name: Annotated[str, typer.Option(metavar="NAME", help="Name of the agent.")],
+    unstuck: Annotated[
+        int | None,
+        typer.Option(
+            min=1, metavar="TICKS", help="Bar what was done while stuck so long.", show_default="never"
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, metavar="N", help="Seed of the measuring games.")] = 0,
+    workspace: WorkspaceOption = Path(),
+) -> None:
+    """Make an agent of finished runs, one for each layout; measure it and write its card."""
+    from galley.learning.bundling import export as make_bundle
+
+    bundle = make_bundle(workspace, runs, name, unstuck_after_ticks=unstuck, seed=seed, tell=typer.echo)
+    typer.echo(f"{bundle.path}: written; galley agents check tries it")

@@ -41,7 +41,7 @@ def dense_onnx(layers: Sequence[Layer]) -> bytes:
 def grid_onnx(weights: Mapping[str, NDArray[np.float32]], shape: tuple[int, ...]) -> bytes:
     """An ONNX file of a `Policy` from its state dict as arrays, for observations of `shape` [C, H, W].
 
-    Input `observation` float32 [B, C, H, W], output `logits` float32 [B, 6], dynamic B; the value is left out.
+    Input `observation` float32 [B, C, H, W], output `logits` float32 [B, 6], dynamic B; without the value.
     """
     nodes, value = [], "observation"
     used = {name: array for name, array in weights.items() if not name.startswith("value.")}

@@ -22,7 +22,7 @@ Bonus = Callable[[Rollout], torch.Tensor]
 class Machine:
     """Where learning is done: the device, and whether networks run in bfloat16 there."""
 
-    device: torch.device = torch.device("cpu")
+    device: torch.device
     bf16: bool = False
 
 

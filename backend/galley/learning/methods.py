@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
+from pathlib import Path
 from typing import Any, Final, Literal, get_args
 
 import torch
@@ -11,11 +12,14 @@ import torch
 from galley.errors import GalleyError
 from galley.kitchen import Layout
 from galley.learning.learner import Machine
+from galley.learning.policy import Policy
 from galley.learning.populations.cole import Cole, ColeSettings
 from galley.learning.populations.fcp import FCP
 from galley.learning.populations.mep import MEP
+from galley.learning.populations.milestones import STAGES
 from galley.learning.populations.pbt import PBT
 from galley.learning.populations.self_play import SelfPlay
+from galley.learning.run_folder import load_policy, run_asked
 from galley.learning.settings import PPOSettings, constants
 from galley.learning.training import Training
 from galley.names import name_fix
@@ -35,10 +39,11 @@ QUICK: Final[dict[str, Any]] = {
     "minibatches": 6,
     "epochs": 4,
     "clip": 0.2,
-    "learning_rate": 1e-3,
+    "learning_rate": 1.5e-3,
+    "final_rate_share": 0.2,
     "max_gradient_norm": 0.5,
-    "entropy_start": 0.05,
-    "entropy_end": 0.01,
+    "entropy_start": 0.02,
+    "entropy_end": 0.002,
 }
 """Constants with which a policy needs a fifth of the ticks: larger steps, updates four times as often."""
 
@@ -58,6 +63,7 @@ class Asked:
     generations: int | None = None
     generation_updates: int | None = None
     population: int | None = None
+    pool: tuple[str, ...] = ()
     changes: tuple[tuple[str, float], ...] = ()
     threads: int = 1
     device: str = "cpu"
@@ -82,6 +88,7 @@ def make(asked: Asked, layout: Layout) -> Training:
         return FCP(
             layout, settings, seeds=asked.population or FCP_SEEDS, self_play_updates=updates,
             updates=round(FCP_RESPONSE * updates), seed=seed, machine=machine,
+            pool=pooled(asked.pool, layout, machine.device),
         )  # fmt: skip
     if asked.method == "mep":
         return MEP(
@@ -101,6 +108,8 @@ def settings_of(asked: Asked) -> tuple[PPOSettings, float]:
         raise GalleyError(f"method {asked.method!r} is unknown; {name_fix(asked.method, METHODS)}")
     if not 0 < asked.scale <= 10:
         raise GalleyError(f"scale is {asked.scale}; use a number above 0 and at most 10")
+    if asked.pool and asked.method != "fcp":
+        raise GalleyError(f"--pool gives FCP its population; method {asked.method} makes its own")
     if asked.population is not None and not 1 < asked.population <= 64:
         raise GalleyError(f"population is {asked.population}; use 2 to 64")
     known = constants(asked.layout)
@@ -152,6 +161,25 @@ def cole_of(asked: Asked) -> ColeSettings:
     return found
 
 
+def pooled(runs: Sequence[str], layout: Layout, device: torch.device) -> dict[str, Policy]:
+    """The milestones of finished self-play runs, by run and stage.
+
+    Raises:
+        GalleyError: a folder is no such run, of another layout, or not finished.
+    """
+    found = {}
+    for run in map(Path, runs):
+        asked = run_asked(run)
+        if asked["method"] != "sp" or asked["layout"] != layout.name:
+            raise GalleyError(
+                f"{run}: is a run of {asked['method']} on {asked['layout']}; "
+                f"the pool wants finished runs of sp on {layout.name}"
+            )
+        for stage in STAGES:
+            found[f"{run.name}-{stage}"] = load_policy(run / "members" / f"{stage}.pt", layout, device)
+    return found
+
+
 def machine_of(asked: Asked) -> Machine:
     """Where the run is done.
 
@@ -189,7 +217,12 @@ def parsed_changes(texts: Sequence[str]) -> tuple[tuple[str, float], ...]:
 def described(asked: Asked) -> dict[str, Any]:
     """Everything that makes a run what it is, for run.json."""
     settings, _ = settings_of(asked)
-    told = {**asdict(asked), "changes": dict(asked.changes), "ppo": asdict(settings)}
+    told = {
+        **asdict(asked),
+        "changes": dict(asked.changes),
+        "pool": list(asked.pool),
+        "ppo": asdict(settings),
+    }
     if asked.method.startswith("cole"):
         told["cole"] = asdict(cole_of(asked))
     return told

@@ -8,7 +8,7 @@ import numba
 import numpy as np
 import torch
 from torch import nn
-from torch.nn import functional as F
+from torch.nn import functional
 
 from galley.kitchen import ACTIONS, Encoder, Layout
 from galley.learning import sparse_kernel as kernels
@@ -64,7 +64,7 @@ class Policy(nn.Module):
     """A policy and a value for observations `grid` uint8 [B, 26, H, W] of one layout.
 
     Convolutions 5x5 and 3x3 "same" and 3x3 "valid" with 25 filters, dense layers of 64, leaky ReLU 0.2; the
-    heads share them. On a CPU the first convolution uses that observations are sparse; the result is the same.
+    heads share them. On a CPU the first convolution makes use of sparse observations, to the same result.
 
     Source: COLE paper, App. C; Carroll et al. 2019 (arXiv:1910.05789), App. C, for kernels and slope.
     """
@@ -90,7 +90,8 @@ class Policy(nn.Module):
                 continue
             gain = 0.01 if layer is self.logits else 1.0 if layer is self.value else 2.0**0.5
             nn.init.orthogonal_(layer.weight, gain, generator=generator)
-            nn.init.zeros_(layer.bias)
+            if layer.bias is not None:
+                nn.init.zeros_(layer.bias)
         self.to(memory_format=torch.channels_last)
 
     def forward(self, seen: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
@@ -98,15 +99,17 @@ class Policy(nn.Module):
         if seen.device.type == "cpu":
             flow = _SparseConvolution.apply(seen, self.map, self.first.weight, self.first.bias)
         else:
-            flow = F.leaky_relu(self.first(seen.float().contiguous(memory_format=torch.channels_last)), SLOPE)
-        flow = F.leaky_relu(self.second(flow), SLOPE)
-        flow = F.leaky_relu(self.third(flow), SLOPE).flatten(1)
+            flow = functional.leaky_relu(
+                self.first(seen.float().contiguous(memory_format=torch.channels_last)), SLOPE
+            )
+        flow = functional.leaky_relu(self.second(flow), SLOPE)
+        flow = functional.leaky_relu(self.third(flow), SLOPE).flatten(1)
         for layer in self.dense:
-            flow = F.leaky_relu(layer(flow), SLOPE)
+            flow = functional.leaky_relu(layer(flow), SLOPE)
         return self.logits(flow).float(), self.value(flow).float().squeeze(1)
 
 
 def use_threads(threads: int) -> None:
     """Nothing; PyTorch and the kernels here use that many threads from now on."""
     torch.set_num_threads(threads)
-    numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))
+    numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import torch
-from torch.nn import functional as F
+from torch.nn import functional
 
 from galley.learning.policy import Policy
 from galley.learning.rollout import Rollout
@@ -94,7 +94,7 @@ def update(
             ):
                 with torch.autocast(device.type, torch.bfloat16, enabled=bf16):
                     logits, values = policy(seen[chunk].to(device))
-                log_policy = F.log_softmax(logits, dim=1)
+                log_policy = functional.log_softmax(logits, dim=1)
                 now = log_policy.gather(1, actions[inside].unsqueeze(1)).squeeze(1)
                 entropy = -(log_policy.exp() * log_policy).sum(dim=1)
                 change = now - before[inside]

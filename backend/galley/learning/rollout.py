@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -137,7 +138,7 @@ class Episodes:
         return torch.rand(shape, generator=generator, device=self.device)
 
     def _partners(self, learner: Policy, pairings: Sequence[Pairing], *, skip_own: bool) -> torch.Tensor:
-        """float32 [kitchens, 6]: the partners' logits for what they see; rows of the learner may be left out."""
+        """float32 [kitchens, 6]: the partners' logits for what they see; the learner's may be left out."""
         across = torch.from_numpy(self._across).to(self.device)
         logits = torch.empty(self.batch.size, len(ACTIONS), device=self.device)
         start = 0
@@ -158,7 +159,7 @@ class Episodes:
 
 
 def choose(logits: torch.Tensor, draws: torch.Tensor) -> torch.Tensor:
-    """int64 [B]: an action for each row of `logits` [B, 6], sampled by inversion with `draws` [B] in [0, 1)."""
+    """int64 [B]: an action for each row of `logits` [B, 6], by inversion with `draws` [B] in [0, 1)."""
     reached = torch.softmax(logits, dim=1).cumsum(dim=1)
     return (reached[:, :-1] <= draws.unsqueeze(1)).sum(dim=1)
 
@@ -177,6 +178,9 @@ def alternating(pairings: Sequence[Pairing]) -> NDArray[np.int64]:
 
 
 def derived_seed(*parts: int) -> int:
-    """A seed for one purpose of a run: the same for the same numbers, unrelated for others."""
-    state = np.random.SeedSequence([part & 0xFFFFFFFF for part in parts]).generate_state(2, np.uint32)
-    return int(state[0]) << 31 ^ int(state[1])
+    """A seed of 63 bits for one purpose: the same for the same whole numbers, unrelated for others."""
+    words = [len(parts)]  # NumPy takes zeros at the end for nothing
+    for part in parts:
+        words += [part & 0xFFFFFFFF, part >> 32 & 0xFFFFFFFF]
+    state = np.random.SeedSequence(words).generate_state(2, np.uint32)
+    return (int(state[0]) << 31) ^ int(state[1])

@@ -30,8 +30,9 @@ COLUMNS: Final = (
     "divergence",
     "seconds",
 )
-"""Columns of `log.csv`: ticks learned from in the whole run, generation or member at work, its update, mean score
-of the update's episodes, what the run is doing, extra reward an episode, the update's figures, seconds at work."""
+"""Columns of `log.csv`: ticks learned from in the whole run, generation or member at work, its update, mean
+score of the update's episodes, what the run is doing, extra reward an episode, figures of the update, seconds
+at work."""
 
 
 class RunFolder:
@@ -123,6 +124,21 @@ class RunFolder:
             )
 
 
+def run_asked(path: Path) -> dict[str, Any]:
+    """What was asked of the finished run in a folder.
+
+    Raises:
+        GalleyError: the folder holds no run, or one that is not finished.
+    """
+    described = path / "run.json"
+    if not described.is_file():
+        raise GalleyError(f"{path}: is no run (there is no run.json); name a folder that `learn train` made")
+    if not (path / "members" / "best.pt").is_file():
+        raise GalleyError(f"{path}: the run is not finished; give the command again that began it")
+    found: dict[str, Any] = json.loads(described.read_text("utf-8"))
+    return found
+
+
 def load_policy(path: Path, layout: Layout, device: torch.device) -> Policy:
     """A policy of a run, to play with.
 
@@ -134,7 +150,8 @@ def load_policy(path: Path, layout: Layout, device: torch.device) -> Policy:
     own = policy.state_dict()
     if set(own) != set(weights) or any(own[key].shape != weights[key].shape for key in own):
         raise GalleyError(
-            f"{path}: its weights do not fit layout {layout.name} with encoding grid; name a policy trained there"
+            f"{path}: its weights do not fit layout {layout.name} with encoding grid; "
+            "name a policy that was trained there"
         )
     policy.load_state_dict(weights)
     return policy.requires_grad_(False)

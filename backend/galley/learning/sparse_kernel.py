@@ -1,12 +1,12 @@
 """The compiled first convolution of a policy on sparse observations, in one file for Numba's cache.
 
-An observation of a kitchen is the layout's map, the same for every tick, and a handful of numbers besides: where
-the chefs stand and look, what lies, is held or cooks. A convolution is linear, so that of the map is worked out
-once, and each other number adds its filters where it reaches: about 1 % of the dense work, with the same result.
+An observation of a kitchen is the layout's map, the same for every tick, and a handful of numbers besides:
+where the chefs stand and look, what lies, is held or cooks. A convolution is linear, so that of the map is
+worked out once, and each other number adds its filters where it reaches: about 1 % of the dense work.
 
 Arrays are flat: `observations` uint8 [B, C*H*W]; `filters` float32 [C, K, K*F], whose last axis runs over the
-columns *backwards* (K) and the filters (F), so that what one number adds to a row of the result is contiguous;
-results float32 [B, H*W*F], channels last. The convolution is "same": K odd, zeros around.
+columns *backwards* (K) and the filters (F), so that what one number adds to a row of the result is
+contiguous; results float32 [B, H*W*F], channels last. The convolution is "same": K odd, zeros around.
 """
 
 from __future__ import annotations
@@ -16,13 +16,12 @@ from numba import njit, prange
 from numpy import float32, int32, uint8
 from numpy.typing import NDArray
 
-
 _BLOCK = 64
 
 
 @njit(cache=True, nogil=True)
 def differing(seen: NDArray[uint8], map_: NDArray[uint8], places: NDArray[int32]) -> int:
-    """How many numbers of `seen` differ from `map_`, both uint8 [C*H*W]; their places come first in `places`."""
+    """How many numbers of `seen` differ from `map_`, both uint8 [C*H*W]; fills `places` with where."""
     found = 0
     for start in range(0, seen.size, _BLOCK):
         end = min(start + _BLOCK, seen.size)
@@ -42,7 +41,7 @@ def spread(
     seen: NDArray[uint8], map_: NDArray[uint8], places: NDArray[int32], filters: NDArray[float32],
     height: int, width: int, out: NDArray[float32],
 ) -> None:  # fmt: skip
-    """Nothing; adds the convolution of `seen` - `map_`, which differ at `places`, to `out` float32 [H*W*F]."""
+    """Nothing; adds the convolution of `seen` - `map_`, not 0 at `places`, to `out` float32 [H*W*F]."""
     reach = filters.shape[1] // 2
     count = filters.shape[2] // filters.shape[1]
     for place in places:
@@ -101,10 +100,10 @@ def convolve_back(
     observations: NDArray[uint8], map_: NDArray[uint8], out: NDArray[float32], gradient: NDArray[float32],
     height: int, width: int, slope: float, of_filters: NDArray[float32], of_map: NDArray[float32],
 ) -> None:  # fmt: skip
-    """Nothing; adds the gradients of `filters` to `of_filters` [P, C, K, K*F], of the map's result to `of_map`.
+    """Nothing; adds the gradients of `filters` to `of_filters` [P, C, K, K*F], of the map's to `of_map`.
 
-    `of_map` is [P, H*W*F]. The batch is cut into P parts, each summed in order by one thread, so that the result
-    depends on P but not on how the threads run.
+    `of_map` is [P, H*W*F]. The batch is cut into P parts, each summed in order by one thread, so that the
+    result depends on P but not on how the threads run.
     """
     parts = of_filters.shape[0]
     size = observations.shape[0]

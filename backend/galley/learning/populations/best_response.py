@@ -16,7 +16,7 @@ from galley.learning.settings import PPOSettings
 from galley.learning.training import Told, row_of
 
 PARTNERS = 6
-"""Partners drawn for an update, each for as many kitchens. Ours: more make batches small, fewer updates noisy."""
+"""Partners drawn for an update, each for as many kitchens. Ours: more make small batches, fewer are noisy."""
 
 
 class BestResponse:

@@ -171,7 +171,7 @@ class Cole:
         return self.learner.frozen()
 
     def _pairings(self) -> list[Pairing]:
-        """The kitchens of the next update, dealt by the ratio; the visits of the drawn partners are counted."""
+        """The kitchens of the next update, dealt by the ratio; drawn partners count as visited."""
         own, others = self.cole.ratio
         generator = np.random.default_rng(derived_seed(self.seed, _DEAL, self.learner.done))
         drawn, self.visits = draw_partners(self.phi, self.visits, self.cole.exploration, others, generator)

@@ -12,7 +12,6 @@ from galley.learning.learner import Machine
 from galley.learning.payoffs import probabilities
 from galley.learning.policy import Policy
 from galley.learning.populations.best_response import BestResponse
-from galley.learning.populations.milestones import STAGES, Milestones
 from galley.learning.populations.self_play import SelfPlay
 from galley.learning.rollout import Rollout, derived_seed
 from galley.learning.settings import PPOSettings
@@ -46,9 +45,6 @@ class MEP:
             SelfPlay(layout, settings, self_play_updates, derived_seed(seed, 50, number), machine)
             for number in range(size)
         ]
-        self.milestones = [Milestones(self_play_updates) for _ in self.trainings]
-        for milestones, training in zip(self.milestones, self.trainings, strict=True):
-            milestones.note(0, 0.0, training.learner.policy)
         self.population: dict[str, Policy] = {}
         self.response = BestResponse(layout, settings, updates, seed, machine, alpha=alpha)
         self.total = size * self_play_updates + updates
@@ -67,7 +63,7 @@ class MEP:
         """One update of the policy whose turn it is, or of the best response."""
         size = len(self.trainings)
         ticks = self.response.learner.settings.ticks
-        if self.population:
+        if all(training.finished for training in self.trainings):
             return self.response.step(
                 list(self.population.values()), ticks_before=self._done * ticks, generation=size
             )
@@ -75,19 +71,14 @@ class MEP:
         training = self.trainings[number]
         told = training.step(self._bonus, stage="population")
         told.row.update(ticks=self._done * ticks, generation=number)
-        self.milestones[number].note(training.learner.done, told.row["score"], training.learner.policy)
-        if not all(one.finished for one in self.trainings):
-            return told
-        for number, milestones in enumerate(self.milestones):
-            chosen = milestones.chosen(training.learner.policy)
-            self.population.update({f"{number:02}-{stage}": chosen[stage] for stage in STAGES})
-        return Told(told.row, dict(self.population))
+        joined = {f"{number:02}-{stage}": policy for stage, policy in told.joined.items()}
+        self.population.update(joined)
+        return Told(told.row, joined)
 
     def state(self) -> dict[str, Any]:
         """All but the weights of the population."""
         return {
             "trainings": [training.state() for training in self.trainings],
-            "milestones": [milestones.state() for milestones in self.milestones],
             "population": list(self.population),
             "response": self.response.state(),
         }
@@ -96,8 +87,6 @@ class MEP:
         """Nothing; goes back to where `state` was taken."""
         for training, kept in zip(self.trainings, state["trainings"], strict=True):
             training.restore(kept, member)
-        for milestones, kept in zip(self.milestones, state["milestones"], strict=True):
-            milestones.restore(kept)
         self.population = {name: member(name) for name in state["population"]}
         self.response.restore(state["response"])
 

@@ -24,7 +24,7 @@ class Milestones:
         self._kept: list[dict[str, Any]] = []
 
     def note(self, done: int, score: float, policy: Policy) -> None:
-        """Nothing; keeps the policy where `done` updates are a point of the grid; `score` is of that update."""
+        """Nothing; keeps the policy where `done` updates are on the grid; `score` is that update's."""
         if done % self._every == 0 or done in (0, self.updates):
             weights = {name: tensor.cpu().clone() for name, tensor in policy.state_dict().items()}
             self._kept.append({"score": score, "weights": weights})

@@ -19,7 +19,7 @@ from galley.learning.training import Told, row_of
 MUTATED: Final = (
     "lambda_", "clip", "learning_rate", "epochs", "entropy_start", "entropy_end", "value_coefficient",
 )  # fmt: skip
-"""What a copied policy varies, each with a probability, by a factor. The two ends of the entropy go together."""
+"""What a copied policy varies, each with a chance, by a factor; the two ends of the entropy together."""
 
 CHANCE: Final = 0.33
 FACTORS: Final = (0.75, 1.25)
@@ -32,7 +32,8 @@ class PBT:
     size^2 pairings each policy plays `games` games on either seat with all others and itself; the policy with
     the worst mean gets weights, optimiser and constants of the best, and the constants vary.
 
-    Source: Carroll et al. 2019 (arXiv:1910.05789), Sec. 4.1, App. C; Jaderberg et al. 2017 (arXiv:1711.09846).
+    Source: Carroll et al. 2019 (arXiv:1910.05789), Sec. 4.1, App. C; Jaderberg et al. 2017
+    (arXiv:1711.09846).
     """
 
     def __init__(

@@ -8,19 +8,25 @@ from typing import Any
 from galley.kitchen import Layout
 from galley.learning.learner import Bonus, Learner, Machine, kitchens_of
 from galley.learning.policy import Policy
+from galley.learning.populations.milestones import Milestones
 from galley.learning.rollout import Episodes, Pairing, derived_seed
 from galley.learning.settings import PPOSettings
 from galley.learning.training import Told, row_of
 
 
 class SelfPlay:
-    """SP. Source: Carroll et al. 2019 (arXiv:1910.05789), Sec. 4.1; both seats' rows are learned from."""
+    """SP: both seats' rows are learned from; three milestones on the way are kept, for FCP and MEP.
+
+    Source: Carroll et al. 2019 (arXiv:1910.05789), Sec. 4.1.
+    """
 
     def __init__(
         self, layout: Layout, settings: PPOSettings, updates: int, seed: int, machine: Machine
     ) -> None:
         self.learner = Learner(layout, settings, updates, derived_seed(seed, 10), machine)
         self.episodes = Episodes(layout, kitchens_of(layout, settings), machine.device)
+        self.milestones = Milestones(updates)
+        self.milestones.note(0, 0.0, self.learner.policy)
 
     @property
     def finished(self) -> bool:
@@ -38,17 +44,18 @@ class SelfPlay:
         rollout, figures = self.learner.learn(
             self.episodes, [Pairing(None, kitchens)], both=True, bonus=bonus
         )
-        return Told(
-            row_of(self.learner, rollout, figures, ticks=self.learner.ticks, generation=0, stage=stage)
-        )
+        row = row_of(self.learner, rollout, figures, ticks=self.learner.ticks, generation=0, stage=stage)
+        self.milestones.note(self.learner.done, row["score"], self.learner.policy)
+        return Told(row, self.milestones.chosen(self.learner.policy) if self.finished else {})
 
     def state(self) -> dict[str, Any]:
-        """That of the learner."""
-        return self.learner.state()
+        """All of it."""
+        return {"learner": self.learner.state(), "milestones": self.milestones.state()}
 
     def restore(self, state: dict[str, Any], member: Callable[[str], Policy]) -> None:
         """Nothing; goes back to where `state` was taken."""
-        self.learner.restore(state)
+        self.learner.restore(state["learner"])
+        self.milestones.restore(state["milestones"])
 
     def best(self) -> Policy:
         """The policy as it is."""

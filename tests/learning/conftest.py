@@ -1,0 +1,12 @@
+"""Learning in tests runs on one thread: results do not hang on the number of cores, nor does the time."""
+
+from __future__ import annotations
+
+import pytest
+
+from galley.learning.policy import use_threads
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _one_thread() -> None:
+    use_threads(1)

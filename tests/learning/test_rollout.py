@@ -1,0 +1,103 @@
+"""Episodes of a learner beside partners."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from galley.errors import GalleyError
+from galley.kitchen import Encoder, Kitchen
+from galley.learning.payoffs import games_with
+from galley.learning.policy import Policy
+from galley.learning.rollout import Episodes, Pairing, choose, derived_seed
+from tests.learning.kitchens import CPU, SMALL
+
+
+def policy(seed: int) -> Policy:
+    return Policy(SMALL, torch.Generator().manual_seed(seed)).requires_grad_(False)
+
+
+class Always(Policy):
+    """A policy that takes one action."""
+
+    def __init__(self, action: int) -> None:
+        super().__init__(SMALL)
+        self.action = action
+
+    def forward(self, seen: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        logits = torch.full((len(seen), 6), -50.0)
+        logits[:, self.action] = 50.0
+        return logits, torch.zeros(len(seen))
+
+
+def test_what_is_recorded_is_what_the_rules_make_of_the_actions() -> None:
+    learner, partner = policy(1), policy(2)
+    episodes = Episodes(SMALL, 6, CPU.device)
+    rollout = episodes.play(learner, [Pairing(None, 2), Pairing(partner, 4)], 5, both=True)
+    encoder = Encoder(SMALL, "grid")
+    assert rollout.seats.tolist() == [0, 1, 0, 1, 0, 1, 1, 0]
+    assert rollout.kitchens.tolist() == [0, 1, 2, 3, 4, 5, 0, 1]
+    for row, again in ((0, 6), (1, 7)):  # both seats of the kitchens played with itself are on record
+        kitchen = Kitchen(SMALL)
+        for tick in range(SMALL.rules.horizon_ticks):
+            for index in (row, again):
+                seen = encoder.seat(kitchen.state[np.newaxis], int(rollout.seats[index]))[0]
+                assert np.array_equal(seen, rollout.seen[tick, index].numpy())
+            actions = {int(rollout.seats[one]): int(rollout.actions[tick, one]) for one in (row, again)}
+            assert kitchen.step(actions[0], actions[1]) == rollout.rewards[tick, row]
+
+
+def test_log_probabilities_and_values_are_the_learners() -> None:
+    learner = policy(1)
+    rollout = Episodes(SMALL, 4, CPU.device).play(learner, [Pairing(policy(2), 4)], 1)
+    logits, values = learner(rollout.seen.flatten(0, 1))
+    taken = logits.log_softmax(1).gather(1, rollout.actions.flatten().unsqueeze(1)).squeeze(1)
+    torch.testing.assert_close(rollout.log_probabilities.flatten(), taken, rtol=1e-4, atol=1e-6)
+    torch.testing.assert_close(rollout.values.flatten(), values, rtol=1e-4, atol=1e-6)
+
+
+def test_equal_seeds_give_equal_rollouts_and_others_do_not() -> None:
+    episodes = Episodes(SMALL, 8, CPU.device)
+    first, same, other = (episodes.play(policy(1), [Pairing(None, 8)], seed) for seed in (1, 1, 2))
+    assert torch.equal(first.actions, same.actions)
+    assert not torch.equal(first.actions, other.actions)
+
+
+def test_partners_play_the_other_seat() -> None:
+    rollout = Episodes(SMALL, 2, CPU.device).play(Always(4), [Pairing(Always(2), 2)], 1)
+    other_cell = rollout.seen[:, 0, 1].flatten(1).argmax(dim=1).tolist()  # of seat 1, which starts at (3, 2)
+    assert set(other_cell) == {2 * 5 + 3}  # blocked by the counter at once
+    other_cell = rollout.seen[:, 1, 1].flatten(1).argmax(dim=1).tolist()  # of seat 0, which walks east
+    assert other_cell[:4] == [1 * 5 + 1, 1 * 5 + 2, 1 * 5 + 3, 1 * 5 + 3]
+
+
+def test_sampling_by_inversion_follows_the_probabilities() -> None:
+    logits = torch.log(torch.tensor([[0.5, 0.2, 0.1, 0.1, 0.05, 0.05]]))
+    draws = torch.linspace(0, 1, 20001)[:-1]
+    found = choose(logits.expand(len(draws), 6), draws)
+    shares = torch.bincount(found, minlength=6) / len(draws)
+    torch.testing.assert_close(shares, torch.tensor([0.5, 0.2, 0.1, 0.1, 0.05, 0.05]), atol=2e-4, rtol=0)
+
+
+def test_games_with_partners_are_told_by_seat() -> None:
+    scores = games_with(SMALL, policy(1), [policy(2), Always(4), policy(1)], 3, 7, CPU.device)
+    assert scores.shape == (3, 2, 3)
+    again = games_with(SMALL, policy(1), [policy(2), Always(4), policy(1)], 3, 7, CPU.device)
+    assert np.array_equal(scores, again)
+
+
+def test_order_lists_are_refused() -> None:
+    with pytest.raises(GalleyError, match="may not have `orders`"):
+        Episodes(SMALL.with_rules(orders=("onion",)), 2, CPU.device)
+
+
+def test_pairings_must_share_out_all_kitchens() -> None:
+    with pytest.raises(ValueError, match="share out 4 kitchens"):
+        Episodes(SMALL, 4, CPU.device).play(policy(1), [Pairing(None, 3)], 1)
+
+
+def test_derived_seeds_differ_by_any_part() -> None:
+    seeds = {derived_seed(*parts) for parts in ((1,), (2,), (1, 0), (1, 1), (1, 1, 0), (-1,), (1 << 40,))}
+    assert len(seeds) == 7
+    assert all(0 <= seed < 1 << 63 for seed in seeds)
