@@ -23,6 +23,9 @@ LABELLED = 6
 PANELS = 4
 """Sub-preference graphs in a row, and how many are drawn if none are asked for."""
 
+FAINTEST = 0.1
+"""Edges of lower payoffs, as a share of the highest, are drawn like this one, so that they can be seen."""
+
 _PAYOFFS = "Reds"
 _CENTRALITIES = "Blues_r"
 
@@ -48,19 +51,22 @@ def draw_graphs(table: PayoffTable, steps: Sequence[int] | None = None) -> Figur
         raise GalleyError(f"step {wrong[0]} is not from 2 to {size}, the number of strategies")
     payoffs = table.payoffs()
     with styled():
-        rows = -(-(len(chosen) + 1) // (PANELS + 1)) if len(chosen) > PANELS else 1
         columns = min(len(chosen) + 1, PANELS + 1)
-        figure = new_figure(height_mm=44 * rows + 16, width_mm=max(36 * columns, 90))
-        panels = figure.subplots(rows, columns, squeeze=False).ravel()
+        rows = -(-(len(chosen) + 1) // columns)
+        figure = new_figure(height_mm=46 * rows + 14, width_mm=max(36 * columns, 90))
+        grid = figure.add_gridspec(rows + 1, columns, height_ratios=[*[1.0] * rows, 0.05])
+        panels = [figure.add_subplot(grid[divmod(place, columns)]) for place in range(len(chosen) + 1)]
         _game(panels[0], payoffs)
-        for axes, step in zip(panels[1:], chosen, strict=False):
+        for axes, step in zip(panels[1:], chosen, strict=True):
             _preference(axes, payoffs[:step, :step])
         for axes in panels:
             axes.set_axis_off()
             axes.set_aspect("equal")
             axes.set_xlim(-1.35, 1.35)
             axes.set_ylim(-1.35, 1.35)
-        _keys(figure, list(panels), _highest(payoffs))
+        _key(figure.add_subplot(grid[rows, 0]), _PAYOFFS, _highest(payoffs), "score")
+        told = "preference centrality (0: preferred by all others)"
+        _key(figure.add_subplot(grid[rows, 1:]), _CENTRALITIES, 1.0, told)
     return figure
 
 
@@ -93,7 +99,7 @@ def _game(axes: Axes, payoffs: NDArray[np.float64]) -> None:
         edgelist=edges,
         ax=axes,
         width=(0.3 + 1.7 * share) if size <= 12 else (0.1 + 0.3 * share),
-        edge_color=colormaps[_PAYOFFS](0.1 + 0.9 * share),
+        edge_color=colormaps[_PAYOFFS](np.maximum(share, FAINTEST)),
     )
     _nodes(axes, places, np.full(size, 0.25), newest=None)
     if size <= LABELLED:
@@ -128,7 +134,7 @@ def _nodes(
 ) -> None:
     size = len(places)
     xs, ys = zip(*places.values(), strict=True)
-    faces = colormaps[_CENTRALITIES](0.15 + 0.85 * centralities) if newest is not None else "white"
+    faces = colormaps[_CENTRALITIES](centralities) if newest is not None else "white"
     edges = [2.0 if node == newest else 0.6 for node in places]
     axes.scatter(xs, ys, s=_node_size(size), c=faces, edgecolors="black", linewidths=edges, zorder=3)
     if size > 20:
@@ -156,13 +162,9 @@ def _plate() -> dict[str, object]:
     return {"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none"}
 
 
-def _keys(figure: Figure, panels: list[Axes], highest: float) -> None:
-    """Two colour bars below: payoffs and centralities."""
-    for colours, top, label, where in (
-        (_PAYOFFS, highest, "score", panels[:1]),
-        (_CENTRALITIES, 1.0, "preference centrality (0: preferred by all others)", panels[1:]),
-    ):
-        scale = ScalarMappable(Normalize(0, top), colormaps[colours])
-        bar = figure.colorbar(scale, ax=where, location="bottom", shrink=0.6, aspect=25, pad=0.02)
-        bar.outline.set_visible(False)
-        bar.set_label(label)
+def _key(axes: Axes, colours: str, top: float, label: str) -> None:
+    """A colour bar that fills the axes."""
+    scale = ScalarMappable(Normalize(0, top), colormaps[colours])
+    bar = axes.figure.colorbar(scale, cax=axes, orientation="horizontal")
+    bar.outline.set_visible(False)
+    bar.set_label(label)
