@@ -148,6 +148,39 @@ def test_a_tick_written_twice_is_the_same_tick(store: Store, database: Database)
     assert database.rows("SELECT count(*) FROM clocks") == [(1,)]
 
 
+def test_any_number_of_rows_of_many_rounds_is_written_in_one_go(store: Store, database: Database) -> None:
+    rounds = {open_round(store, begin(store)): count for count in (1, 2, 255, 256, 257, 700)}
+    for number, (round_id, count) in enumerate(rounds.items()):
+        ticks = tick_rows(joint_actions(number, count))
+        faulty = [row._replace(decision_ms=None, late=True, fault="error") for row in ticks[:1]]
+        keys = [KeyRow(seq, "up", seq % 2 == 0, 1.0, START_MS + seq, None, 1) for seq in range(count)]
+        pings = [ClockRow(1.0 * n, START_MS + n, None if n % 2 else 30.0, 0) for n in range(count)]
+        store.journal(round_id, [*faulty, *ticks[1:]], keys, [], pings)
+    store.flush().result()
+    assert store.health().ok
+    for number, (round_id, count) in enumerate(rounds.items()):
+        here = f"WHERE round_id = {round_id}"
+        found = database.rows(f"SELECT tick, action_0, action_1 FROM ticks {here} ORDER BY tick")
+        wanted = joint_actions(number, count)
+        assert found == [(tick, *pair) for tick, pair in enumerate(wanted)]
+        told = "SELECT tick, deadline_ms, lateness_ms, decision_ms, late, fault"
+        assert (
+            database.rows(f"{told} FROM ticks {here} ORDER BY tick")[:2]
+            == [
+                (0, START_MS, 0.5, None, True, "error"),
+                (1, START_MS + 50.0, 0.5, 3.25, False, None),
+            ][:count]
+        )
+        told = "SELECT seq, key, down, client_ms, arrival_ms, tick_applied, seat"
+        assert database.rows(f"{told} FROM keys {here} ORDER BY seq") == [
+            (seq, "up", seq % 2 == 0, 1.0, START_MS + seq, None, 1) for seq in range(count)
+        ]
+        told = "SELECT client_ms, server_ms, rtt_ms, seat"
+        assert database.rows(f"{told} FROM clocks {here} ORDER BY server_ms") == [
+            (1.0 * n, START_MS + n, None if n % 2 else 30.0, 0) for n in range(count)
+        ]
+
+
 def test_a_page_that_was_reloaded_counts_its_keys_anew(store: Store, database: Database) -> None:
     round_id = open_round(store, begin(store))
     for arrival in (START_MS + 1.0, START_MS + 900.0):

@@ -85,6 +85,54 @@ def test_a_question_that_is_overtaken_is_skipped_but_its_news_are_not(thinking: 
     assert (agent.seen, agent.asked) == ([(STAY, STAY), (EAST, WEST)], [2])
 
 
+class Time:
+    """A clock that stands at `now`; who sleeps waits until the test lets go."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+        self.slept: list[float] = []
+        self.go_on = threading.Event()
+
+    def monotonic(self) -> float:
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        self.slept.append(seconds)
+        assert self.go_on.wait(10)
+
+
+def test_who_asks_alone_is_answered_at_once_and_who_asks_next_shares_the_following_batch(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    time = Time()
+    monkeypatch.setattr("galley.server.thinking.time", time)
+    batches: list[int] = []
+
+    class Counting(Thinking):
+        def _decide(self, questions: list[Question]) -> None:
+            batches.append(len(questions))
+            super()._decide(questions)
+
+    thinking = Counting(window_s=0.25)
+    thinking.start()
+    try:
+        first = Mind(thinking, Scripted(), "first").ask(0, STATE, None)
+        answered(first)
+        assert (batches, time.slept) == ([1], [])
+        time.now += 0.0625
+        second = Mind(thinking, Scripted(), "second").ask(0, STATE, None)
+        wait_until(lambda: time.slept == [0.1875])
+        others = [Mind(thinking, Scripted(), f"{number}").ask(0, STATE, None) for number in range(4)]
+        time.go_on.set()
+        answered(second, *others)
+        assert batches == [1, 5]
+        time.now += 1.0
+        answered(Mind(thinking, Scripted(), "late").ask(0, STATE, None))
+        assert (batches, time.slept) == ([1, 5, 1], [0.1875])
+    finally:
+        thinking.stop()
+
+
 def test_one_agent_at_fault_costs_the_others_nothing(
     thinking: Thinking, caplog: pytest.LogCaptureFixture
 ) -> None:
