@@ -132,8 +132,15 @@ def play_cells(
     played, `on_done` each as soon as it is there.
 
     Raises:
-        GalleyError: an agent cannot be loaded or played; the scheduler does not answer.
+        GalleyError: an agent cannot be loaded or played; the results hold games of another seed; the
+            scheduler does not answer.
     """
+    others = sorted({cell.seed for cell in results} - {seed})
+    if others:
+        raise GalleyError(
+            f"the results hold games of seed {others[0]}, which those of seed {seed} would replace; "
+            f"use --seed {others[0]}, or another file"
+        )
     roster = Roster(workspace)
     tasks = []
     for layout in layouts:
@@ -141,8 +148,7 @@ def play_cells(
             bundles = [roster.bundle(name) for name in pair]
             fingerprint = _fingerprint(layout, bundles)
             kept = results.get(layout.name, *pair)
-            same = kept is not None and kept.seed == seed and kept.fingerprint == fingerprint
-            if kept is None or not same or len(kept.scores) < games:
+            if kept is None or kept.fingerprint != fingerprint or len(kept.scores) < games:
                 tasks.append(Task(layout.name, pair, fingerprint))
     on_start(len(tasks))
 
