@@ -8,19 +8,35 @@ from typing import Any
 import schemathesis
 from hypothesis import HealthCheck, given, settings
 
+from galley.server.admin.gate import SESSION_COOKIE
 from galley.server.origin import HEADERS
+from tests.admin.office import csrf
 from tests.security.conftest import Site
 from tests.security.hostile import SCRIPTS
 from tests.security.walk import TOKEN, class_of
 
 SHARED_OUT = 5
 """A route gets this part of the examples of the profile."""
+ENDS_SESSION = ("/researcher/logout", "/researcher/login")
 NO_PAGES = ("SOCKET", "MOUNT")
 FIELDS = (
     *("step", "choice", "skip", "time_up", "leave", "hidden", "often", "words", "sentences", "kind"),
-    *("csrf", "name", "password", "next", "state", "text", "language"),
+    *("csrf", "name", "password", "next", "state", "text", "language", "cell", "link", "participant"),
 )
-QUERY = ("PROLIFIC_PID", "language", "code", "status", "sort", "page", "after", "from", "to", "next", "test")
+QUERY = (
+    "PROLIFIC_PID",
+    "galley-test",
+    "language",
+    "code",
+    "status",
+    "sort",
+    "page",
+    "after",
+    "from",
+    "to",
+    "next",
+    "test",
+)
 
 
 def description(site: Site) -> dict[str, Any]:
@@ -75,8 +91,33 @@ def test_no_request_breaks_the_server(site: Site) -> None:
         ask()
 
 
-def check(case: schemathesis.Case, site: Site) -> None:
-    answer = case.call(base_url=site.served.url, allow_redirects=False, timeout=30)
+def test_no_request_of_a_researcher_breaks_the_server(site: Site) -> None:
+    """The same behind the login: with a session's cookie, and with its token in every form."""
+    researcher = site.researcher()
+    token = csrf(researcher.get("/researcher").text)
+    session = {SESSION_COOKIE: researcher.cookies[SESSION_COOKIE]}
+    schema = schemathesis.openapi.from_dict(description(site))
+    found = [operation.ok() for operation in schema.get_all_operations()]
+    behind = [one for one in found if one.path.startswith("/researcher") and one.path not in ENDS_SESSION]
+    assert len(behind) > 10
+    for operation in behind:
+
+        @given(case=operation.as_strategy())
+        @settings(
+            max_examples=max(1, settings().max_examples // SHARED_OUT),
+            suppress_health_check=list(HealthCheck),
+        )
+        def ask(case: schemathesis.Case) -> None:
+            if isinstance(case.body, dict):
+                case.body["csrf"] = token
+            check(case, site, cookies=session)
+
+        ask()
+    assert "Studies" in researcher.get("/researcher").text, "still logged in"
+
+
+def check(case: schemathesis.Case, site: Site, **more: Any) -> None:
+    answer = case.call(base_url=site.served.url, allow_redirects=False, timeout=30, **more)
     assert answer.status_code < 500, f"{answer.status_code} for {case.as_curl_command()}"
     if answer.status_code != 400:  # what is no HTTP is refused before it reaches a page
         for name in HEADERS:
