@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import pytest
-
-from galley.learning.policy import use_threads
+import torch
 
 
 @pytest.fixture(autouse=True, scope="session")
 def _one_thread() -> None:
-    use_threads(1)
+    torch.set_num_threads(1)

@@ -8,7 +8,7 @@ from galley.kitchen import Layout
 from galley.learning.learner import Machine
 from galley.learning.settings import PPOSettings
 
-CPU = Machine(torch.device("cpu"), bf16=False)
+CPU = Machine(torch.device("cpu"))
 
 SMALL = Layout.from_ascii(
     "small",

@@ -18,7 +18,7 @@ from galley.learning.populations.best_response import BestResponse, priorities
 from galley.learning.populations.cole import Cole, ColeSettings
 from galley.learning.populations.fcp import FCP
 from galley.learning.populations.mep import MEP
-from galley.learning.populations.milestones import Milestones
+from galley.learning.populations.milestones import Milestones, checkpoint
 from galley.learning.populations.pbt import MUTATED, PBT, mutated
 from galley.learning.populations.self_play import SelfPlay
 from galley.learning.rollout import Pairing
@@ -192,6 +192,13 @@ def test_milestones_are_first_half_and_last() -> None:
         milestones.note(done, float(score), like)
     chosen = {stage: float(policy.value.bias.detach()) for stage, policy in milestones.chosen(like).items()}
     assert chosen == {"early": 0.0, "half": 4.0, "final": 10.0}
+
+
+def test_checkpoints_are_fifty_along_a_training() -> None:
+    for updates in (50, 120, 1000):
+        names = [name for done in range(1, updates + 1) if (name := checkpoint(done, updates))]
+        assert names == [f"{number:04}" for number in range(1, 51)]
+    assert [checkpoint(done, 3) for done in (1, 2, 3)] == ["0016", "0033", "0050"]
 
 
 def test_pbt_pairs_everybody_with_everybody_in_a_round() -> None:

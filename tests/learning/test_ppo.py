@@ -77,6 +77,19 @@ def test_minibatches_in_chunks_change_nothing_but_rounding(monkeypatch: pytest.M
     assert made[0][1].entropy == pytest.approx(made[1][1].entropy, rel=1e-3)
 
 
+def test_threads_share_a_minibatch_and_change_nothing_but_rounding() -> None:
+    learner = Learner(SMALL, QUICK, 5, 1, CPU)
+    rollout = Episodes(SMALL, 8, CPU.device).play(learner.policy, [Pairing(None, 8)], 1)
+    made = []
+    for threads in (1, 2, 3, 3):
+        policy = copy.deepcopy(learner.policy)
+        update(policy, adam(policy, QUICK), rollout, QUICK, progress=0, shaping=1, seed=3, threads=threads)
+        made.append(torch.cat([parameter.detach().flatten() for parameter in policy.parameters()]))
+    torch.testing.assert_close(made[0], made[1], rtol=0, atol=2e-4)
+    torch.testing.assert_close(made[0], made[2], rtol=0, atol=2e-4)
+    assert torch.equal(made[2], made[3])
+
+
 def test_rate_and_entropy_fall_along_the_run() -> None:
     settings = QUICK.changed(final_rate_share=0.1)
     learner = Learner(SMALL, settings, 5, 1, CPU)

@@ -19,9 +19,11 @@ from galley.cli import app
 from galley.errors import GalleyError
 from galley.kitchen.layout_file import load_layout
 from galley.learning.bundling import export
+from galley.learning.graph import PayoffTable
 from galley.learning.learner import Learner
 from galley.learning.methods import Asked, described, make, parsed_changes, pooled
 from galley.learning.run_folder import RunFolder
+from galley.learning.run_payoffs import run_payoffs
 from galley.learning.training_card import command, paper_ticks
 from galley.workspace import Workspace
 from tests.learning.kitchens import CPU, QUICK
@@ -109,12 +111,13 @@ def test_published_constants_are_the_defaults(workspace: Path) -> None:
 
 def test_runs_become_an_agent_with_a_card(workspace: Path) -> None:
     run = train(workspace, "sp", "--layout", "tiny", "--scale", "0.00004")
-    assert sorted(path.name for path in (run / "members").iterdir()) == [
-        "best.pt",
-        "early.pt",
-        "final.pt",
-        "half.pt",
-    ]
+    assert {path.name for path in (run / "members").iterdir()} == {
+        "0025.pt", "0050.pt", "best.pt", "early.pt", "final.pt", "half.pt",
+    }  # fmt: skip
+    table = run_payoffs(workspace, run, games=2)
+    assert table.names == ["0025", "0050"]
+    assert table.games.tolist() == [[2, 2], [2, 2]]
+    assert PayoffTable.load(run / "payoffs.npz").names == table.names
     bundle = export(workspace, [run], "newcomer")
     assert Catalogue(Workspace(workspace)).bundle("newcomer").sha256 == bundle.sha256
     card = (bundle.path / "card.md").read_text()

@@ -16,6 +16,7 @@ from galley.errors import GalleyError
 app = typer.Typer(help="Make agents (needs PyTorch: pip install 'galley[learn]').", no_args_is_help=True)
 app.command()(learn_train.train)
 app.command()(learn_train.export)
+app.command()(learn_train.payoffs)
 app.command()(learn_evaluate.evaluate)
 app.add_typer(learn_plot.app, name="plot")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -76,14 +76,10 @@ def train(
     workspace: WorkspaceOption = Path(),
 ) -> None:
     """Train a partner; the same command goes on with a run that was stopped."""
-    from tqdm import tqdm
-
     from galley.kitchen.layout_file import find_layout
-    from galley.learning.methods import Asked, described, machine_of, make, parsed_changes
-    from galley.learning.policy import use_threads
+    from galley.learning.methods import Asked, parsed_changes
     from galley.learning.populations.cole import ColeSettings
-    from galley.learning.run_folder import RunFolder
-    from galley.learning.training import run
+    from galley.learning.train import train_run
     from galley.workspace import Workspace
 
     place = Workspace(workspace)
@@ -106,20 +102,8 @@ def train(
         device=device,
         bf16=bf16,
     )
-    use_threads(asked.threads)
-    training = make(asked, kitchen)
     path = out or place.path / "runs" / f"{method.value}-{kitchen.name}-{seed}"
-    folder = RunFolder(path, described(asked))
-    with tqdm(total=1.0, bar_format="{percentage:5.1f}%|{bar}| {elapsed}<{remaining} {postfix}") as bar:
-
-        def tell(share: float, row: dict[str, Any]) -> None:
-            bar.n = share
-            bar.set_postfix_str(f"{row['stage']} {row['generation']} score {row['score']:.1f}", refresh=True)
-
-        policy = run(
-            training, folder, lambda name: folder.member(name, kitchen, machine_of(asked).device), tell=tell
-        )
-    folder.keep("best", policy)
+    train_run(asked, kitchen, path)
     typer.echo(f"{path}: done; make an agent of it with: galley learn export {path} --name {method.value}")
 
 
@@ -140,3 +124,20 @@ def export(
 
     bundle = make_bundle(workspace, runs, name, unstuck_after_ticks=unstuck, seed=seed, tell=typer.echo)
     typer.echo(f"{bundle.path}: written; galley agents check tries it")
+
+
+def payoffs(
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a finished run.")],
+    games: Annotated[int, typer.Option(min=1, metavar="N", help="Games of a pair in each seat order.")] = 5,
+    seed: Annotated[int, typer.Option(min=0, metavar="N", help="Seed of all games.")] = 0,
+    workspace: WorkspaceOption = Path(),
+) -> None:
+    """Play the checkpoints of a run with each other, for galley learn plot matrices and graphs."""
+    from galley.learning.run_payoffs import run_payoffs
+
+    with typer.progressbar(length=100) as bar:
+        run_payoffs(
+            workspace, run, games=games, seed=seed,
+            tell=lambda done, total: bar.update(100 * done // total - bar.pos),
+        )  # fmt: skip
+    typer.echo(f"{run / 'payoffs.npz'}: written")

@@ -20,6 +20,7 @@ from galley.errors import GalleyError
 from galley.kitchen import Encoder, Layout
 from galley.kitchen.layout_file import find_layout
 from galley.learning.export import grid_onnx
+from galley.learning.export_filled import filled
 from galley.learning.policy import ENCODING
 from galley.learning.run_folder import load_tensors, run_asked
 from galley.learning.training_card import training_card
@@ -62,7 +63,7 @@ def export(
     facts = _facts(folder)
     for run, one, layout in zip(runs, asked, layouts, strict=True):
         weights = {key: tensor.numpy() for key, tensor in load_tensors(run / "members" / "best.pt").items()}
-        content = grid_onnx(weights, Encoder(layout, ENCODING).shape)
+        content = filled(grid_onnx(weights, Encoder(layout, ENCODING).shape))
         (folder / f"{layout.name}.onnx").write_bytes(content)
         facts[layout.name] = {"asked": one, **_made(run), "scores": {}}
         facts[layout.name]["ticks"] += sum(_made(Path(made))["ticks"] for made in one["pool"])

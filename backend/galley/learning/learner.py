@@ -20,9 +20,13 @@ Bonus = Callable[[Rollout], torch.Tensor]
 
 @dataclass(frozen=True)
 class Machine:
-    """Where learning is done: the device, and whether networks run in bfloat16 there."""
+    """Where learning is done: the device, threads on a CPU, and whether networks run in bfloat16.
+
+    Results of other numbers of threads differ by rounding.
+    """
 
     device: torch.device
+    threads: int = 1
     bf16: bool = False
 
 
@@ -76,6 +80,7 @@ class Learner:
             shaping=shaping_weight(self.ticks, self.settings),
             seed=derived_seed(self.seed, 2, self.done),
             bonus=None if bonus is None else bonus(rollout),
+            threads=self.machine.threads,
             bf16=self.machine.bf16,
         )
         self.done += 1

@@ -192,7 +192,7 @@ def machine_of(asked: Asked) -> Machine:
         raise GalleyError("device cuda: PyTorch finds no CUDA GPU here; use --device cpu")
     if asked.threads < 1:
         raise GalleyError(f"threads is {asked.threads}; use a whole number of at least 1")
-    return Machine(torch.device(asked.device), asked.bf16)
+    return Machine(torch.device(asked.device), asked.threads, asked.bf16)
 
 
 def parsed_changes(texts: Sequence[str]) -> tuple[tuple[str, float], ...]:

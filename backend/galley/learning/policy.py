@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
 import torch
 from torch import nn
@@ -48,11 +47,9 @@ class _SparseConvolution(torch.autograd.Function):
         channels, size, count, height, width = ctx.shape
         observations, flat_map, out = ctx.kept
         asked = gradients[0].permute(0, 2, 3, 1).reshape(len(out), -1).numpy()
-        parts = torch.get_num_threads()
-        of_filters = np.zeros((parts, channels, size, size * count), dtype=np.float32)
-        of_map = np.zeros((parts, height * width * count), dtype=np.float32)
-        kernels.convolve_back(observations, flat_map, out, asked, height, width, SLOPE, of_filters, of_map)
-        filters, rest = of_filters.sum(axis=0), of_map.sum(axis=0)
+        filters = np.zeros((channels, size, size * count), dtype=np.float32)
+        rest = np.zeros(height * width * count, dtype=np.float32)
+        kernels.convolve_back(observations, flat_map, out, asked, height, width, SLOPE, filters, rest)
         nothing, everywhere = np.zeros_like(flat_map), np.flatnonzero(flat_map).astype(np.int32)
         kernels.gather(flat_map, nothing, everywhere, rest, height, width, filters)
         weight = filters.reshape(channels, size, size, count)[:, :, ::-1].transpose(3, 0, 1, 2)
@@ -107,9 +104,3 @@ class Policy(nn.Module):
         for layer in self.dense:
             flow = functional.leaky_relu(layer(flow), SLOPE)
         return self.logits(flow).float(), self.value(flow).float().squeeze(1)
-
-
-def use_threads(threads: int) -> None:
-    """Nothing; PyTorch and the kernels here use that many threads from now on."""
-    torch.set_num_threads(threads)
-    numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]

@@ -8,6 +8,7 @@ import torch
 from torch.nn import functional
 
 from galley.learning.policy import Policy
+from galley.learning.replicas import Replicas
 from galley.learning.rollout import Rollout
 from galley.learning.settings import PPOSettings
 
@@ -61,6 +62,7 @@ def update(
     shaping: float,
     seed: int,
     bonus: torch.Tensor | None = None,
+    threads: int = 1,
     bf16: bool = False,
 ) -> UpdateFigures:
     """What one update did to `policy`; `progress` in 0..1 is how much of the run is over.
@@ -79,39 +81,40 @@ def update(
     for group in optimiser.param_groups:
         group["lr"] = settings.learning_rate * (1 - progress * (1 - settings.final_rate_share))
 
+    def passed(replica: Policy, rows: torch.Tensor, gained: torch.Tensor, size: int) -> torch.Tensor:
+        """float32 [5]: the figures of some rows of a minibatch of `size`; their gradients go to `replica`."""
+        figures = torch.zeros(5, device=device)
+        most = len(rows) if device.type == "cuda" else LARGEST_CHUNK
+        for chunk, advantage in zip(rows.split(most), gained.split(most), strict=True):
+            with torch.autocast(device.type, torch.bfloat16, enabled=bf16):
+                logits, values = replica(seen[chunk.cpu()].to(device))
+            log_policy = functional.log_softmax(logits, dim=1)
+            now = log_policy.gather(1, actions[chunk].unsqueeze(1)).squeeze(1)
+            entropy = -(log_policy.exp() * log_policy).sum(dim=1)
+            change = now - before[chunk]
+            ratio = change.exp()
+            clipped = ratio.clamp(1 - settings.clip, 1 + settings.clip)
+            policy_loss = -torch.minimum(ratio * advantage, clipped * advantage)
+            value_loss = 0.5 * (values - returns[chunk]).square()
+            loss = policy_loss + settings.value_coefficient * value_loss - entropy_weight * entropy
+            (loss.sum() / size).backward()
+            told = (policy_loss, value_loss, entropy, (ratio != clipped).float(), ratio - 1 - change)
+            figures += torch.stack([one.detach().sum() for one in told]) / size
+        return figures
+
     generator = torch.Generator().manual_seed(seed)
     figures = torch.zeros(5, device=device)
-    for _ in range(settings.epochs):
-        order = torch.randperm(len(actions), generator=generator)
-        for rows in order.chunk(settings.minibatches):
-            here = rows.to(device)
-            advantage = found[here]
-            advantage = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
-            optimiser.zero_grad(set_to_none=True)
-            size = len(rows) if device.type == "cuda" else LARGEST_CHUNK
-            for chunk, inside, gained in zip(
-                rows.split(size), here.split(size), advantage.split(size), strict=True
-            ):
-                with torch.autocast(device.type, torch.bfloat16, enabled=bf16):
-                    logits, values = policy(seen[chunk].to(device))
-                log_policy = functional.log_softmax(logits, dim=1)
-                now = log_policy.gather(1, actions[inside].unsqueeze(1)).squeeze(1)
-                entropy = -(log_policy.exp() * log_policy).sum(dim=1)
-                change = now - before[inside]
-                ratio = change.exp()
-                clipped = ratio.clamp(1 - settings.clip, 1 + settings.clip)
-                policy_loss = -torch.minimum(ratio * gained, clipped * gained)
-                value_loss = 0.5 * (values - returns[inside]).square()
-                loss = policy_loss + settings.value_coefficient * value_loss - entropy_weight * entropy
-                (loss.sum() / len(rows)).backward()
-                with torch.no_grad():
-                    figures[0] += policy_loss.sum() / len(rows)
-                    figures[1] += value_loss.sum() / len(rows)
-                    figures[2] += entropy.sum() / len(rows)
-                    figures[3] += (ratio != clipped).sum() / len(rows)
-                    figures[4] += (ratio - 1 - change).sum() / len(rows)
-            torch.nn.utils.clip_grad_norm_(policy.parameters(), settings.max_gradient_norm)
-            optimiser.step()
+    with Replicas(policy, threads) as replicas:
+        for _ in range(settings.epochs):
+            order = torch.randperm(len(actions), generator=generator)
+            for minibatch in order.chunk(settings.minibatches):
+                rows = minibatch.to(device)
+                gained = found[rows]
+                gained = (gained - gained.mean()) / (gained.std() + 1e-8)
+                optimiser.zero_grad(set_to_none=True)
+                figures += replicas.add_gradients(passed, rows, gained)
+                torch.nn.utils.clip_grad_norm_(policy.parameters(), settings.max_gradient_norm)
+                optimiser.step()
     means = (figures / (settings.epochs * settings.minibatches)).tolist()
     return UpdateFigures(*means)
 

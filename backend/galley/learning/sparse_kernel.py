@@ -12,7 +12,7 @@ contiguous; results float32 [B, H*W*F], channels last. The convolution is "same"
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy import float32, int32, uint8
 from numpy.typing import NDArray
 
@@ -78,44 +78,36 @@ def gather(
                 into[index] += number * asked[index]
 
 
-@njit(cache=True, fastmath=True, parallel=True)
+@njit(cache=True, fastmath=True, nogil=True)
 def convolve(
     observations: NDArray[uint8], map_: NDArray[uint8], filters: NDArray[float32], of_map: NDArray[float32],
     height: int, width: int, slope: float, out: NDArray[float32],
 ) -> None:  # fmt: skip
     """Nothing; fills `out` with the leaky ReLU of the convolution; `of_map` [H*W*F] is that of the map."""
     lower = float32(slope)
-    for index in prange(observations.shape[0]):
-        row = out[index]
-        places = np.empty(map_.size, dtype=int32)
+    places = np.empty(map_.size, dtype=int32)
+    for index in range(observations.shape[0]):
         found = differing(observations[index], map_, places)
+        row = out[index]
         row[:] = of_map
         spread(observations[index], map_, places[:found], filters, height, width, row)
         for place in range(row.size):
             row[place] = max(row[place], lower * row[place])
 
 
-@njit(cache=True, fastmath=True, parallel=True)
+@njit(cache=True, fastmath=True, nogil=True)
 def convolve_back(
     observations: NDArray[uint8], map_: NDArray[uint8], out: NDArray[float32], gradient: NDArray[float32],
     height: int, width: int, slope: float, of_filters: NDArray[float32], of_map: NDArray[float32],
 ) -> None:  # fmt: skip
-    """Nothing; adds the gradients of `filters` to `of_filters` [P, C, K, K*F], of the map's to `of_map`.
-
-    `of_map` is [P, H*W*F]. The batch is cut into P parts, each summed in order by one thread, so that the
-    result depends on P but not on how the threads run.
-    """
-    parts = of_filters.shape[0]
-    size = observations.shape[0]
+    """Nothing; adds the gradients of `filters` to `of_filters` [C, K, K*F], of the map's to `of_map`."""
     lower = float32(slope)
-    for part in prange(parts):
-        asked = np.empty(out.shape[1], dtype=float32)
-        places = np.empty(map_.size, dtype=int32)
-        total = of_map[part]
-        for index in range(part * size // parts, (part + 1) * size // parts):
-            for place in range(asked.size):
-                value = gradient[index, place]
-                asked[place] = value if out[index, place] > 0 else lower * value
-                total[place] += asked[place]
-            found = differing(observations[index], map_, places)
-            gather(observations[index], map_, places[:found], asked, height, width, of_filters[part])
+    asked = np.empty(out.shape[1], dtype=float32)
+    places = np.empty(map_.size, dtype=int32)
+    for index in range(observations.shape[0]):
+        for place in range(asked.size):
+            value = gradient[index, place]
+            asked[place] = value if out[index, place] > 0 else lower * value
+            of_map[place] += asked[place]
+        found = differing(observations[index], map_, places)
+        gather(observations[index], map_, places[:found], asked, height, width, of_filters)

@@ -89,6 +89,15 @@ class PayoffTable:
         self.standard_error[seat_0, seat_1] = standard_error
         self.games[seat_0, seat_1] = games
 
+    def measure(self, seat_0: int, seat_1: int, scores: NDArray[np.integer]) -> None:
+        """Nothing; keeps mean and standard error of the `scores` [games] of one seat order.
+
+        Raises:
+            ValueError: as `set`.
+        """
+        error = float(np.std(scores, ddof=1) / np.sqrt(len(scores))) if len(scores) > 1 else 0.0
+        self.set(seat_0, seat_1, float(np.mean(scores)), error, len(scores))
+
     def cell(self, seat_0: int, seat_1: int) -> Cell | None:
         """What was measured in one seat order, None if nothing was."""
         self._known(seat_0, seat_1)

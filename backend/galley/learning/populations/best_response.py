@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from galley.kitchen import Layout
 from galley.learning.learner import Learner, Machine, kitchens_of
 from galley.learning.policy import Policy
+from galley.learning.populations.milestones import checkpoint
 from galley.learning.rollout import Episodes, Pairing, derived_seed
 from galley.learning.settings import PPOSettings
 from galley.learning.training import Told, row_of
@@ -76,7 +77,8 @@ class BestResponse:
             self.learner, rollout, figures,
             ticks=ticks_before + self.learner.ticks, generation=generation, stage="best response",
         )  # fmt: skip
-        return Told(row)
+        name = checkpoint(self.learner.done, self.learner.updates)
+        return Told(row, {} if name is None else {name: self.learner.frozen()})
 
     def state(self) -> dict[str, Any]:
         """What `restore` needs."""

@@ -213,14 +213,10 @@ class Cole:
         seed = derived_seed(self.seed, _PAYOFFS, self.learner.done)
         scores = games_with(self.layout, policy, self.members, self.cole.games, seed, self.machine.device)
         for other, games in enumerate(scores):
-            self._measure(number, other, games[0])
+            self.table.measure(number, other, games[0])
             if other != number:
-                self._measure(other, number, games[1])
+                self.table.measure(other, number, games[1])
         return number
-
-    def _measure(self, seat_0: int, seat_1: int, scores: NDArray[np.int64]) -> None:
-        error = float(scores.std(ddof=1) / np.sqrt(len(scores))) if len(scores) > 1 else 0.0
-        self.table.set(seat_0, seat_1, float(scores.mean()), error, len(scores))
 
     def _solved(self) -> NDArray[np.float64]:
         """The cooperative incompatibility distribution of the population."""

@@ -9,6 +9,7 @@ from galley.kitchen import Layout
 from galley.learning.learner import Machine
 from galley.learning.policy import Policy
 from galley.learning.populations.best_response import BestResponse
+from galley.learning.populations.milestones import STAGES
 from galley.learning.populations.self_play import SelfPlay
 from galley.learning.rollout import derived_seed
 from galley.learning.settings import PPOSettings
@@ -70,8 +71,8 @@ class FCP:
         told = self.training.step()
         told.row.update(ticks=ticks_before + learner.ticks, generation=self.number)
         if not self.training.finished:
-            return told
-        joined = {f"{self.number:02}-{stage}": policy for stage, policy in told.joined.items()}
+            return Told(told.row)
+        joined = {f"{self.number:02}-{stage}": told.joined[stage] for stage in STAGES}
         self.population.update(joined)
         self.number += 1
         if self.number < self.seeds:

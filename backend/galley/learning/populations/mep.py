@@ -12,6 +12,7 @@ from galley.learning.learner import Machine
 from galley.learning.payoffs import probabilities
 from galley.learning.policy import Policy
 from galley.learning.populations.best_response import BestResponse
+from galley.learning.populations.milestones import STAGES
 from galley.learning.populations.self_play import SelfPlay
 from galley.learning.rollout import Rollout, derived_seed
 from galley.learning.settings import PPOSettings
@@ -71,7 +72,9 @@ class MEP:
         training = self.trainings[number]
         told = training.step(self._bonus, stage="population")
         told.row.update(ticks=self._done * ticks, generation=number)
-        joined = {f"{number:02}-{stage}": policy for stage, policy in told.joined.items()}
+        joined = {}
+        if training.finished:
+            joined = {f"{number:02}-{stage}": told.joined[stage] for stage in STAGES}
         self.population.update(joined)
         return Told(told.row, joined)
 

@@ -9,6 +9,7 @@ from galley.learning.policy import Policy
 
 STAGES: Final = ("early", "half", "final")
 KEPT: Final = 20
+CHECKPOINTS: Final = 50
 
 
 class Milestones:
@@ -48,3 +49,12 @@ def _loaded(like: Policy, weights: dict[str, Any]) -> Policy:
     policy = copy.deepcopy(like)
     policy.load_state_dict(weights)
     return policy.requires_grad_(False)
+
+
+def checkpoint(done: int, updates: int) -> str | None:
+    """The name of the checkpoint that is due after `done` of `updates` updates, None where none is.
+
+    Source: COLE paper, Sec. 7.3: 50 checkpoints, uniform along a training, are compared.
+    """
+    number = CHECKPOINTS * done // max(1, updates)
+    return f"{number:04}" if number > CHECKPOINTS * (done - 1) // max(1, updates) else None

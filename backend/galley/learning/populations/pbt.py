@@ -12,6 +12,7 @@ from galley.kitchen import Layout
 from galley.learning.learner import Learner, Machine, kitchens_of
 from galley.learning.payoffs import games_with
 from galley.learning.policy import Policy
+from galley.learning.populations.milestones import checkpoint
 from galley.learning.rollout import Episodes, Pairing, derived_seed
 from galley.learning.settings import PPOSettings
 from galley.learning.training import Told, row_of
@@ -84,7 +85,8 @@ class PBT:
         )  # fmt: skip
         if place == size * size - 1 or self.finished:
             self._select(turn, vary=not self.finished)
-        return Told(row)
+        name = checkpoint(self.done, self.total)
+        return Told(row, {} if name is None else {name: self.best()})
 
     def state(self) -> dict[str, Any]:
         """All of it."""

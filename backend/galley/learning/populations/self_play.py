@@ -8,7 +8,7 @@ from typing import Any
 from galley.kitchen import Layout
 from galley.learning.learner import Bonus, Learner, Machine, kitchens_of
 from galley.learning.policy import Policy
-from galley.learning.populations.milestones import Milestones
+from galley.learning.populations.milestones import Milestones, checkpoint
 from galley.learning.rollout import Episodes, Pairing, derived_seed
 from galley.learning.settings import PPOSettings
 from galley.learning.training import Told, row_of
@@ -46,7 +46,9 @@ class SelfPlay:
         )
         row = row_of(self.learner, rollout, figures, ticks=self.learner.ticks, generation=0, stage=stage)
         self.milestones.note(self.learner.done, row["score"], self.learner.policy)
-        return Told(row, self.milestones.chosen(self.learner.policy) if self.finished else {})
+        joined = self.milestones.chosen(self.learner.policy) if self.finished else {}
+        name = checkpoint(self.learner.done, self.learner.updates)
+        return Told(row, joined if name is None else {name: self.learner.frozen(), **joined})
 
     def state(self) -> dict[str, Any]:
         """All of it."""

@@ -1,0 +1,56 @@
+"""`galley learn payoffs`: how the checkpoints of a run cook with each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from galley.errors import GalleyError
+from galley.kitchen.layout_file import find_layout
+from galley.learning.graph import PayoffTable
+from galley.learning.payoffs import games_with
+from galley.learning.populations.milestones import CHECKPOINTS
+from galley.learning.rollout import derived_seed
+from galley.learning.run_folder import load_policy, run_asked
+from galley.workspace import Workspace
+
+
+def run_payoffs(
+    workspace: Path,
+    run: Path,
+    *,
+    games: int = 5,
+    seed: int = 0,
+    tell: Callable[[int, int], None] = lambda done, total: None,
+) -> PayoffTable:
+    """The payoffs of up to 50 checkpoints of a finished run, uniform along it, also written to payoffs.npz.
+
+    Every pair plays `games` games in each seat order. COLE's checkpoints are the strategies of its
+    generations, those of other methods the policy in the making; `tell` hears of rows done and all.
+
+    Source: COLE paper, Sec. 7.3 and Fig. 10.
+
+    Raises:
+        GalleyError: there is no finished run in the folder, or fewer than two checkpoints.
+    """
+    layout = find_layout(Workspace(workspace), run_asked(run)["layout"])
+    names = sorted(path.stem for path in (run / "members").glob("[0-9][0-9][0-9][0-9].pt"))
+    if len(names) < 2:
+        raise GalleyError(f"{run}: has {len(names)} checkpoints; comparing takes at least 2")
+    places = np.unique(np.linspace(0, len(names) - 1, min(CHECKPOINTS, len(names))).round().astype(int))
+    device = torch.device("cpu")
+    chosen = [names[place] for place in places]
+    policies = [load_policy(run / "members" / f"{name}.pt", layout, device) for name in chosen]
+    table = PayoffTable(chosen)
+    for row, policy in enumerate(policies):
+        scores = games_with(layout, policy, policies[row:], games, derived_seed(seed, row), device)
+        for column, (as_first, as_second) in enumerate(scores, row):
+            table.measure(row, column, as_first)
+            if column != row:
+                table.measure(column, row, as_second)
+        tell(row + 1, len(policies))
+    table.save(run / "payoffs.npz")
+    return table

@@ -1,0 +1,39 @@
+"""`galley learn train`: a run from where it is to its end, with a bar."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import torch
+from tqdm import tqdm
+
+from galley.kitchen import Layout
+from galley.learning.methods import Asked, described, machine_of, make
+from galley.learning.policy import Policy
+from galley.learning.run_folder import RunFolder
+from galley.learning.training import run
+
+
+def train_run(asked: Asked, layout: Layout, path: Path) -> Policy:
+    """The policy of the run that was asked for, also kept as member `best`; goes on with what is in `path`.
+
+    Raises:
+        GalleyError: something asked for cannot be, or `path` holds another run.
+    """
+    torch.set_num_threads(asked.threads)
+    training = make(asked, layout)
+    folder = RunFolder(path, described(asked))
+
+    def member(name: str) -> Policy:
+        return folder.member(name, layout, machine_of(asked).device)
+
+    with tqdm(total=1.0, bar_format="{percentage:5.1f}%|{bar}| {elapsed}<{remaining} {postfix}") as bar:
+
+        def tell(share: float, row: dict[str, Any]) -> None:
+            bar.n = share
+            bar.set_postfix_str(f"{row['stage']} {row['generation']} score {row['score']:.1f}")
+
+        policy = run(training, folder, member, tell=tell)
+    folder.keep("best", policy)
+    return policy
