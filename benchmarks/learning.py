@@ -5,8 +5,8 @@
     python benchmarks/learning.py --device cuda --bf16   on a GPU
 
 Counter Circuit, the paper's network and constants: updates of 48,000 ticks (120 kitchens), 8 epochs of 10
-minibatches, a quarter of the kitchens with itself and three quarters with three partners of a population of
-50, whose payoffs with a new strategy are measured as at the end of each generation. All cores unless `--threads`
+minibatches, a quarter of the kitchens with itself, three quarters with three partners of a population of 50,
+whose payoffs with a new strategy are measured as at the end of each generation. All cores unless `--threads`
 says otherwise; the best of the repeats, because other work on the machine can only make one slower.
 """
 
@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import resource
 import sys
 import time
@@ -28,6 +29,7 @@ import torch  # noqa: E402
 
 from galley.kitchen.layout_file import load_layout  # noqa: E402
 from galley.learning.learner import Learner, kitchens_of  # noqa: E402
+from galley.learning.memory import keep_freed_memory  # noqa: E402
 from galley.learning.methods import Asked, cole_of, machine_of, settings_of  # noqa: E402
 from galley.learning.payoffs import games_with  # noqa: E402
 from galley.learning.policy import Policy  # noqa: E402
@@ -59,19 +61,20 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--json", action="store_true")
-    parser.add_argument("--threads", type=int, default=torch.get_num_threads())
+    parser.add_argument("--threads", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--bf16", action="store_true")
     parser.add_argument("--repeats", type=int, default=3)
     args = parser.parse_args()
 
-    torch.set_num_threads(args.threads)
+    torch.set_num_threads(1)
+    keep_freed_memory()
     layout = load_layout(ROOT / "layouts" / f"{LAYOUT}.yaml")
     asked = Asked("cole-sv", LAYOUT, threads=args.threads, device=args.device, bf16=args.bf16)
     settings, cole, machine = settings_of(asked)[0], cole_of(asked), machine_of(asked)
     learner = Learner(layout, settings, 100, 0, machine)
     kitchens = kitchens_of(layout, settings)
-    episodes = Episodes(layout, kitchens, machine.device)
+    episodes = Episodes(layout, kitchens, machine)
     partners = [
         Policy(layout, torch.Generator().manual_seed(number)).to(machine.device).requires_grad_(False)
         for number in range(POPULATION)
@@ -106,7 +109,7 @@ def main() -> None:
     cooking_s = best(cook, args.repeats)
     playing_s = best(lambda: episodes.play(learner.policy, pairings, 0), args.repeats)
     learning_s = best(learn, args.repeats)
-    payoffs_s = best(lambda: games_with(layout, learner.policy, partners, cole.games, 0, machine.device), 1)
+    payoffs_s = best(lambda: games_with(layout, learner.policy, partners, cole.games, 0, machine), 1)
     ticks = kitchens * episodes.horizon
     update_s = playing_s + learning_s
     total_s = cole.generations * (cole.updates * update_s + payoffs_s)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 
 from galley.kitchen import Layout
-from galley.learning.learner import Machine
+from galley.learning.forwards import Machine
 from galley.learning.settings import PPOSettings
 
 CPU = Machine(torch.device("cpu"))

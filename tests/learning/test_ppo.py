@@ -11,6 +11,7 @@ import torch
 import galley.learning.ppo as ppo
 from galley.errors import GalleyError
 from galley.kitchen import Layout
+from galley.learning.forwards import Machine
 from galley.learning.learner import Learner
 from galley.learning.populations.self_play import SelfPlay
 from galley.learning.ppo import adam, advantages, shaping_weight, update
@@ -65,12 +66,14 @@ def test_a_bonus_is_paid_unscaled() -> None:
 
 def test_minibatches_in_chunks_change_nothing_but_rounding(monkeypatch: pytest.MonkeyPatch) -> None:
     learner = Learner(SMALL, QUICK, 5, 1, CPU)
-    rollout = Episodes(SMALL, 8, CPU.device).play(learner.policy, [Pairing(None, 8)], 1)
+    rollout = Episodes(SMALL, 8, CPU).play(learner.policy, [Pairing(None, 8)], 1)
     made = []
     for chunk in (7, 1200):
         monkeypatch.setattr(ppo, "LARGEST_CHUNK", chunk)
         policy = copy.deepcopy(learner.policy)
-        figures = update(policy, adam(policy, QUICK), rollout, QUICK, progress=0, shaping=1, seed=3)
+        figures = update(
+            policy, adam(policy, QUICK), rollout, QUICK, progress=0, shaping=1, seed=3, machine=CPU
+        )
         made.append((policy, figures))
     for one, other in zip(made[0][0].parameters(), made[1][0].parameters(), strict=True):
         torch.testing.assert_close(one, other, rtol=0, atol=2e-4)
@@ -79,11 +82,20 @@ def test_minibatches_in_chunks_change_nothing_but_rounding(monkeypatch: pytest.M
 
 def test_threads_share_a_minibatch_and_change_nothing_but_rounding() -> None:
     learner = Learner(SMALL, QUICK, 5, 1, CPU)
-    rollout = Episodes(SMALL, 8, CPU.device).play(learner.policy, [Pairing(None, 8)], 1)
+    rollout = Episodes(SMALL, 8, CPU).play(learner.policy, [Pairing(None, 8)], 1)
     made = []
     for threads in (1, 2, 3, 3):
         policy = copy.deepcopy(learner.policy)
-        update(policy, adam(policy, QUICK), rollout, QUICK, progress=0, shaping=1, seed=3, threads=threads)
+        update(
+            policy,
+            adam(policy, QUICK),
+            rollout,
+            QUICK,
+            progress=0,
+            shaping=1,
+            seed=3,
+            machine=Machine(CPU.device, threads),
+        )
         made.append(torch.cat([parameter.detach().flatten() for parameter in policy.parameters()]))
     torch.testing.assert_close(made[0], made[1], rtol=0, atol=2e-4)
     torch.testing.assert_close(made[0], made[2], rtol=0, atol=2e-4)
@@ -93,8 +105,8 @@ def test_threads_share_a_minibatch_and_change_nothing_but_rounding() -> None:
 def test_rate_and_entropy_fall_along_the_run() -> None:
     settings = QUICK.changed(final_rate_share=0.1)
     learner = Learner(SMALL, settings, 5, 1, CPU)
-    rollout = Episodes(SMALL, 8, CPU.device).play(learner.policy, [Pairing(None, 8)], 1)
-    update(learner.policy, learner.optimiser, rollout, settings, progress=0.5, shaping=1, seed=3)
+    rollout = Episodes(SMALL, 8, CPU).play(learner.policy, [Pairing(None, 8)], 1)
+    update(learner.policy, learner.optimiser, rollout, settings, progress=0.5, shaping=1, seed=3, machine=CPU)
     assert learner.optimiser.param_groups[0]["lr"] == pytest.approx(1e-3 * 0.55)
 
 

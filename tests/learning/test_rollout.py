@@ -8,6 +8,7 @@ import torch
 
 from galley.errors import GalleyError
 from galley.kitchen import Encoder, Kitchen
+from galley.learning.forwards import Machine
 from galley.learning.payoffs import games_with
 from galley.learning.policy import Policy
 from galley.learning.rollout import Episodes, Pairing, choose, derived_seed
@@ -25,7 +26,7 @@ class Always(Policy):
         super().__init__(SMALL)
         self.action = action
 
-    def forward(self, seen: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    def forward(self, seen: torch.Tensor, prepared: object = None) -> tuple[torch.Tensor, torch.Tensor]:
         logits = torch.full((len(seen), 6), -50.0)
         logits[:, self.action] = 50.0
         return logits, torch.zeros(len(seen))
@@ -33,7 +34,7 @@ class Always(Policy):
 
 def test_what_is_recorded_is_what_the_rules_make_of_the_actions() -> None:
     learner, partner = policy(1), policy(2)
-    episodes = Episodes(SMALL, 6, CPU.device)
+    episodes = Episodes(SMALL, 6, CPU)
     rollout = episodes.play(learner, [Pairing(None, 2), Pairing(partner, 4)], 5, both=True)
     encoder = Encoder(SMALL, "grid")
     assert rollout.seats.tolist() == [0, 1, 0, 1, 0, 1, 1, 0]
@@ -50,7 +51,7 @@ def test_what_is_recorded_is_what_the_rules_make_of_the_actions() -> None:
 
 def test_log_probabilities_and_values_are_the_learners() -> None:
     learner = policy(1)
-    rollout = Episodes(SMALL, 4, CPU.device).play(learner, [Pairing(policy(2), 4)], 1)
+    rollout = Episodes(SMALL, 4, CPU).play(learner, [Pairing(policy(2), 4)], 1)
     logits, values = learner(rollout.seen.flatten(0, 1))
     taken = logits.log_softmax(1).gather(1, rollout.actions.flatten().unsqueeze(1)).squeeze(1)
     torch.testing.assert_close(rollout.log_probabilities.flatten(), taken, rtol=1e-4, atol=1e-6)
@@ -58,14 +59,26 @@ def test_log_probabilities_and_values_are_the_learners() -> None:
 
 
 def test_equal_seeds_give_equal_rollouts_and_others_do_not() -> None:
-    episodes = Episodes(SMALL, 8, CPU.device)
+    episodes = Episodes(SMALL, 8, CPU)
     first, same, other = (episodes.play(policy(1), [Pairing(None, 8)], seed) for seed in (1, 1, 2))
     assert torch.equal(first.actions, same.actions)
     assert not torch.equal(first.actions, other.actions)
 
 
+def test_threads_change_nothing_but_rounding() -> None:
+    pairings = [Pairing(None, 4), Pairing(policy(2), 4), Pairing(policy(3), 4)]
+    for given in (pairings, [Pairing(None, 12)]):
+        made = [
+            Episodes(SMALL, 12, Machine(CPU.device, threads)).play(policy(1), given, 1, both=True)
+            for threads in (1, 2, 3)
+        ]
+        for other in made[1:]:
+            assert torch.equal(made[0].actions, other.actions)
+            torch.testing.assert_close(made[0].values, other.values, rtol=1e-4, atol=1e-6)
+
+
 def test_partners_play_the_other_seat() -> None:
-    rollout = Episodes(SMALL, 2, CPU.device).play(Always(4), [Pairing(Always(2), 2)], 1)
+    rollout = Episodes(SMALL, 2, CPU).play(Always(4), [Pairing(Always(2), 2)], 1)
     other_cell = rollout.seen[:, 0, 1].flatten(1).argmax(dim=1).tolist()  # of seat 1, which starts at (3, 2)
     assert set(other_cell) == {2 * 5 + 3}  # blocked by the counter at once
     other_cell = rollout.seen[:, 1, 1].flatten(1).argmax(dim=1).tolist()  # of seat 0, which walks east
@@ -81,20 +94,20 @@ def test_sampling_by_inversion_follows_the_probabilities() -> None:
 
 
 def test_games_with_partners_are_told_by_seat() -> None:
-    scores = games_with(SMALL, policy(1), [policy(2), Always(4), policy(1)], 3, 7, CPU.device)
+    scores = games_with(SMALL, policy(1), [policy(2), Always(4), policy(1)], 3, 7, CPU)
     assert scores.shape == (3, 2, 3)
-    again = games_with(SMALL, policy(1), [policy(2), Always(4), policy(1)], 3, 7, CPU.device)
+    again = games_with(SMALL, policy(1), [policy(2), Always(4), policy(1)], 3, 7, CPU)
     assert np.array_equal(scores, again)
 
 
 def test_order_lists_are_refused() -> None:
     with pytest.raises(GalleyError, match="may not have `orders`"):
-        Episodes(SMALL.with_rules(orders=("onion",)), 2, CPU.device)
+        Episodes(SMALL.with_rules(orders=("onion",)), 2, CPU)
 
 
 def test_pairings_must_share_out_all_kitchens() -> None:
     with pytest.raises(ValueError, match="share out 4 kitchens"):
-        Episodes(SMALL, 4, CPU.device).play(policy(1), [Pairing(None, 3)], 1)
+        Episodes(SMALL, 4, CPU).play(policy(1), [Pairing(None, 3)], 1)
 
 
 def test_derived_seeds_differ_by_any_part() -> None:

@@ -137,7 +137,7 @@ def payoffs(
 
     with typer.progressbar(length=100) as bar:
         run_payoffs(
-            workspace, run, games=games, seed=seed,
+            workspace, run, games=games, seed=seed, threads=os.cpu_count() or 1,
             tell=lambda done, total: bar.update(100 * done // total - bar.pos),
         )  # fmt: skip
     typer.echo(f"{run / 'payoffs.npz'}: written")

@@ -4,30 +4,18 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import torch
 
 from galley.kitchen import Layout
+from galley.learning.forwards import Machine
 from galley.learning.policy import Policy
 from galley.learning.ppo import UpdateFigures, adam, shaping_weight, update
 from galley.learning.rollout import Episodes, Pairing, Rollout, derived_seed
 from galley.learning.settings import PPOSettings
 
 Bonus = Callable[[Rollout], torch.Tensor]
-
-
-@dataclass(frozen=True)
-class Machine:
-    """Where learning is done: the device, threads on a CPU, and whether networks run in bfloat16.
-
-    Results of other numbers of threads differ by rounding.
-    """
-
-    device: torch.device
-    threads: int = 1
-    bf16: bool = False
 
 
 class Learner:
@@ -80,8 +68,7 @@ class Learner:
             shaping=shaping_weight(self.ticks, self.settings),
             seed=derived_seed(self.seed, 2, self.done),
             bonus=None if bonus is None else bonus(rollout),
-            threads=self.machine.threads,
-            bf16=self.machine.bf16,
+            machine=self.machine,
         )
         self.done += 1
         return rollout, figures

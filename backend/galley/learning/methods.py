@@ -11,7 +11,7 @@ import torch
 
 from galley.errors import GalleyError
 from galley.kitchen import Layout
-from galley.learning.learner import Machine
+from galley.learning.forwards import Machine
 from galley.learning.policy import Policy
 from galley.learning.populations.cole import Cole, ColeSettings
 from galley.learning.populations.fcp import FCP

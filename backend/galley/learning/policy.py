@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import nn
 from torch.nn import functional
 
@@ -19,23 +20,27 @@ SLOPE = 0.2
 _FIRST_KERNEL = 5
 _NEXT_KERNEL = 3
 
+Prepared = tuple[NDArray[np.float32], NDArray[np.float32]]
+"""Filters of the first convolution as the kernels want them, and the convolution of the map."""
+
 
 class _SparseConvolution(torch.autograd.Function):
     """The leaky ReLU of a "same" convolution on observations that differ little from a map."""
 
     @staticmethod
     def forward(
-        ctx: Any, seen: torch.Tensor, map_: torch.Tensor, weight: torch.Tensor, bias: torch.Tensor
+        ctx: Any,
+        seen: torch.Tensor,
+        map_: torch.Tensor,
+        weight: torch.Tensor,
+        bias: torch.Tensor,
+        filters: NDArray[np.float32],
+        of_map: NDArray[np.float32],
     ) -> torch.Tensor:
         channels, height, width = map_.shape
         count, size = weight.shape[0], weight.shape[2]
-        filters = np.ascontiguousarray(weight.detach().numpy().transpose(1, 2, 3, 0)[:, :, ::-1])
-        filters = filters.reshape(channels, size, size * count)
         observations = seen.reshape(len(seen), -1).numpy()
         flat_map = map_.reshape(-1).numpy()
-        of_map = np.tile(bias.detach().numpy(), height * width)
-        nothing, everywhere = np.zeros_like(flat_map), np.flatnonzero(flat_map).astype(np.int32)
-        kernels.spread(flat_map, nothing, everywhere, filters, height, width, of_map)
         out = torch.empty(len(seen), height * width * count)
         kernels.convolve(observations, flat_map, filters, of_map, height, width, SLOPE, out.numpy())
         ctx.shape = (channels, size, count, height, width)
@@ -54,7 +59,22 @@ class _SparseConvolution(torch.autograd.Function):
         kernels.gather(flat_map, nothing, everywhere, rest, height, width, filters)
         weight = filters.reshape(channels, size, size, count)[:, :, ::-1].transpose(3, 0, 1, 2)
         bias = rest.reshape(-1, count).sum(axis=0)
-        return None, None, torch.from_numpy(np.ascontiguousarray(weight)), torch.from_numpy(bias)
+        whole = torch.from_numpy(np.ascontiguousarray(weight))
+        return None, None, whole, torch.from_numpy(bias), None, None
+
+
+def _prepared(map_: torch.Tensor, layer: nn.Conv2d) -> Prepared:
+    """The layer's filters as the kernels want them, and the convolution of the map."""
+    channels, height, width = map_.shape
+    size = layer.weight.shape[2]
+    filters = np.ascontiguousarray(layer.weight.detach().numpy().transpose(1, 2, 3, 0)[:, :, ::-1])
+    filters = filters.reshape(channels, size, -1)
+    bias = np.zeros(len(layer.weight), np.float32) if layer.bias is None else layer.bias.detach().numpy()
+    of_map = np.tile(bias, height * width)
+    flat_map = map_.reshape(-1).numpy()
+    nothing, everywhere = np.zeros_like(flat_map), np.flatnonzero(flat_map).astype(np.int32)
+    kernels.spread(flat_map, nothing, everywhere, filters, height, width, of_map)
+    return filters, of_map
 
 
 class Policy(nn.Module):
@@ -91,16 +111,28 @@ class Policy(nn.Module):
                 nn.init.zeros_(layer.bias)
         self.to(memory_format=torch.channels_last)
 
-    def forward(self, seen: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    def forward(
+        self, seen: torch.Tensor, prepared: Prepared | None = None
+    ) -> tuple[torch.Tensor, torch.Tensor]:
         """Logits float32 [B, 6] and values float32 [B] of observations uint8 [B, 26, H, W]."""
         if seen.device.type == "cpu":
-            flow = _SparseConvolution.apply(seen, self.map, self.first.weight, self.first.bias)
+            flow = _SparseConvolution.apply(
+                seen,
+                self.map,
+                self.first.weight,
+                self.first.bias,
+                *(prepared or _prepared(self.map, self.first)),
+            )
         else:
             flow = functional.leaky_relu(
                 self.first(seen.float().contiguous(memory_format=torch.channels_last)), SLOPE
             )
-        flow = functional.leaky_relu(self.second(flow), SLOPE)
-        flow = functional.leaky_relu(self.third(flow), SLOPE).flatten(1)
+        flow = functional.leaky_relu(self.second(flow), SLOPE, inplace=True)
+        flow = functional.leaky_relu(self.third(flow), SLOPE, inplace=True).flatten(1)
         for layer in self.dense:
-            flow = functional.leaky_relu(layer(flow), SLOPE)
+            flow = functional.leaky_relu(layer(flow), SLOPE, inplace=True)
         return self.logits(flow).float(), self.value(flow).float().squeeze(1)
+
+    def prepared(self) -> Prepared | None:
+        """What `forward` on a CPU makes of the weights, for many calls between which they do not change."""
+        return _prepared(self.map, self.first) if self.map.device.type == "cpu" else None

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import torch
 from torch.nn import functional
 
+from galley.learning.forwards import Machine
 from galley.learning.policy import Policy
 from galley.learning.replicas import Replicas
 from galley.learning.rollout import Rollout
@@ -62,8 +63,7 @@ def update(
     shaping: float,
     seed: int,
     bonus: torch.Tensor | None = None,
-    threads: int = 1,
-    bf16: bool = False,
+    machine: Machine,
 ) -> UpdateFigures:
     """What one update did to `policy`; `progress` in 0..1 is how much of the run is over.
 
@@ -86,7 +86,7 @@ def update(
         figures = torch.zeros(5, device=device)
         most = len(rows) if device.type == "cuda" else LARGEST_CHUNK
         for chunk, advantage in zip(rows.split(most), gained.split(most), strict=True):
-            with torch.autocast(device.type, torch.bfloat16, enabled=bf16):
+            with torch.autocast(device.type, torch.bfloat16, enabled=machine.bf16):
                 logits, values = replica(seen[chunk.cpu()].to(device))
             log_policy = functional.log_softmax(logits, dim=1)
             now = log_policy.gather(1, actions[chunk].unsqueeze(1)).squeeze(1)
@@ -104,7 +104,7 @@ def update(
 
     generator = torch.Generator().manual_seed(seed)
     figures = torch.zeros(5, device=device)
-    with Replicas(policy, threads) as replicas:
+    with Replicas(policy, machine) as replicas:
         for _ in range(settings.epochs):
             order = torch.randperm(len(actions), generator=generator)
             for minibatch in order.chunk(settings.minibatches):

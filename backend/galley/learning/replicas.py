@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from types import TracebackType
 from typing import Self
 
 import torch
 
+from galley.learning.forwards import Machine
 from galley.learning.policy import Policy
 
 Pass = Callable[[Policy, torch.Tensor, torch.Tensor, int], torch.Tensor]
@@ -23,15 +23,12 @@ class Replicas:
     numbers of threads give equal results.
     """
 
-    def __init__(self, policy: Policy, threads: int) -> None:
-        self.policies = [policy, *(copy.deepcopy(policy) for _ in range(threads - 1))]
-        self._pool: ThreadPoolExecutor | None = None
+    def __init__(self, policy: Policy, machine: Machine) -> None:
+        self._pool = machine.pool()
+        copies = 0 if self._pool is None else machine.threads - 1
+        self.policies = [policy, *(copy.deepcopy(policy) for _ in range(copies))]
 
     def __enter__(self) -> Self:
-        if len(self.policies) > 1:
-            self._pool = ThreadPoolExecutor(
-                len(self.policies), initializer=torch.set_num_threads, initargs=(1,)
-            )
         return self
 
     def __exit__(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from galley.errors import GalleyError
 from galley.kitchen import ACTIONS, Encoder, KitchenBatch, Layout
+from galley.learning.forwards import Forwards, Machine, Ready
 from galley.learning.policy import ENCODING, Policy
 
 
@@ -41,6 +42,22 @@ class Rollout:
     scores: NDArray[np.int64]
 
 
+@dataclass(frozen=True)
+class _Table:
+    """Who plays where: the learner's seat in each kitchen, `own` kitchens where it sits on both.
+
+    `mine` uint8 [kitchens + own, 26, H, W] is what the learner sees, first in its seats, then in the others
+    of `own`; `across` [kitchens, ...] what the other seats see, of which each partner has a slice.
+    """
+
+    learner: Ready
+    seats: NDArray[np.int64]
+    own: NDArray[np.int64]
+    mine: torch.Tensor
+    across: torch.Tensor
+    partners: list[tuple[Ready, slice]]
+
+
 class Episodes:
     """A place to play: `kitchens` kitchens of one layout from reset to horizon, buffers kept between calls.
 
@@ -48,14 +65,15 @@ class Episodes:
         GalleyError: the layout has an order list, with which episodes would end at different ticks.
     """
 
-    def __init__(self, layout: Layout, kitchens: int, device: torch.device) -> None:
+    def __init__(self, layout: Layout, kitchens: int, machine: Machine) -> None:
         if layout.rules.orders is not None:
             raise GalleyError(
                 f"layout {layout.name}: learning plays whole episodes, so its rules may not have `orders`; "
                 "remove them from a copy of the layout"
             )
         self.layout = layout
-        self.device = device
+        self.device = machine.device
+        self.forwards = Forwards(machine)
         self.encoder = Encoder(layout, ENCODING)
         self.horizon = layout.rules.horizon_ticks
         self.batch = KitchenBatch(layout, kitchens)
@@ -68,12 +86,10 @@ class Episodes:
         The kitchens are dealt to the pairings in order, seats alternating within each. With `both`, whoever
         plays with itself learns from both seats. Equal seeds, policies and pairings give equal rollouts.
         """
-        size = self._checked(pairings)
-        seats = alternating(pairings)
-        own = np.concatenate([np.full(one.kitchens, one.partner is None) for one in pairings])
-        doubled = np.flatnonzero(own) if both else np.empty(0, dtype=np.int64)
-        kitchens = np.concatenate([np.arange(size), doubled])
-        rows = len(kitchens)
+        table = self._table(learner, pairings)
+        size = self.batch.size
+        rows = len(table.mine) if both else size
+        kitchens = np.concatenate([np.arange(size), table.own])[:rows]
         draws = self._draws(seed)
         seen = torch.empty((self.horizon, rows, *self.encoder.shape), dtype=torch.uint8)
         actions = torch.empty(self.horizon, rows, dtype=torch.int64, device=self.device)
@@ -83,18 +99,13 @@ class Episodes:
         shaping = np.empty((self.horizon, size), dtype=np.float32)
         self.batch.reset()
         for tick in range(self.horizon):
-            view = seen[tick].numpy()
-            self.encoder.seat(self.batch.states, seats, view[:size])
-            self.encoder.seat(self.batch.states, 1 - seats, self._across)
-            view[size:] = self._across[doubled]
-            there = self._partners(learner, pairings, skip_own=both)
-            logits[tick], values[tick] = learner(seen[tick].to(self.device))
-            there[doubled] = logits[tick, size:]
-            chosen = choose(logits[tick, :size], draws[tick, 0])
+            here, worth, there = self._ask(table)
+            seen[tick] = table.mine[:rows]
+            logits[tick], values[tick] = here[:rows], worth[:rows]
+            chosen = choose(here[:size], draws[tick, 0])
             answered = choose(there, draws[tick, 1])
-            actions[tick, :size] = chosen
-            actions[tick, size:] = answered[doubled]
-            rewards[tick] = self._step(seats, chosen, answered)
+            actions[tick] = torch.cat([chosen, answered[table.own]])[:rows]
+            rewards[tick] = self._step(table.seats, chosen, answered)
             shaping[tick] = self.batch.shaping().sum(axis=1)
         taken = torch.log_softmax(logits, dim=2).gather(2, actions.unsqueeze(2)).squeeze(2)
         return Rollout(
@@ -104,7 +115,7 @@ class Episodes:
             values=values,
             rewards=torch.from_numpy(rewards[:, kitchens]).to(self.device),
             shaping=torch.from_numpy(shaping[:, kitchens]).to(self.device),
-            seats=np.concatenate([seats, 1 - seats[doubled]]),
+            seats=np.concatenate([table.seats, 1 - table.seats[table.own]])[:rows],
             kitchens=kitchens,
             scores=rewards.sum(axis=0).astype(np.int64),
         )
@@ -112,42 +123,61 @@ class Episodes:
     @torch.inference_mode()
     def scores(self, policy: Policy, pairings: Sequence[Pairing], seed: int) -> NDArray[np.int64]:
         """int64 [kitchens]: the scores of one episode of every kitchen, dealt and drawn as in `play`."""
-        size = self._checked(pairings)
-        seats = alternating(pairings)
+        table = self._table(policy, pairings)
         draws = self._draws(seed)
-        seen = np.empty((size, *self.encoder.shape), dtype=np.uint8)
         self.batch.reset()
         for tick in range(self.horizon):
-            self.encoder.seat(self.batch.states, seats, seen)
-            self.encoder.seat(self.batch.states, 1 - seats, self._across)
-            there = self._partners(policy, pairings, skip_own=False)
-            here = policy(torch.from_numpy(seen).to(self.device))[0]
-            self._step(seats, choose(here, draws[tick, 0]), choose(there, draws[tick, 1]))
+            here, _, there = self._ask(table)
+            chosen = choose(here[: self.batch.size], draws[tick, 0])
+            self._step(table.seats, chosen, choose(there, draws[tick, 1]))
         return self.batch.scores.astype(np.int64)
 
-    def _checked(self, pairings: Sequence[Pairing]) -> int:
+    def _table(self, learner: Policy, pairings: Sequence[Pairing]) -> _Table:
+        """Who plays where.
+
+        Raises:
+            ValueError: the pairings do not share out all kitchens.
+        """
         size = self.batch.size
         if sum(pairing.kitchens for pairing in pairings) != size:
             raise ValueError(f"pairings must share out {size} kitchens")
-        return size
+        own = np.flatnonzero(np.concatenate([np.full(one.kitchens, one.partner is None) for one in pairings]))
+        mine = torch.empty((size + len(own), *self.encoder.shape), dtype=torch.uint8)
+        across = torch.empty((size, *self.encoder.shape), dtype=torch.uint8)
+        starts = np.cumsum([0, *(pairing.kitchens for pairing in pairings)])
+        partners = [
+            (Ready(pairing.partner), slice(start, start + pairing.kitchens))
+            for pairing, start in zip(pairings, starts.tolist(), strict=False)
+            if pairing.partner is not None
+        ]
+        return _Table(Ready(learner), alternating(pairings), own, mine, across, partners)
+
+    def _ask(self, table: _Table) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        """The learner's logits [kitchens + own, 6] and values, and the partners' logits [kitchens, 6]."""
+        size = self.batch.size
+        self.encoder.seat(self.batch.states, table.seats, table.mine[:size].numpy())
+        self.encoder.seat(self.batch.states, 1 - table.seats, table.across.numpy())
+        table.mine[size:] = table.across[table.own]
+        parts = table.mine.tensor_split(1 if table.partners else self.forwards.threads)
+        found = self.forwards(
+            [
+                *((table.learner, part) for part in parts),
+                *((partner, table.across[part]) for partner, part in table.partners),
+            ]
+        )
+        here = torch.cat([logits for logits, _ in found[: len(parts)]])
+        worth = torch.cat([values for _, values in found[: len(parts)]])
+        there = torch.empty(size, len(ACTIONS), device=self.device)
+        there[table.own] = here[size:]
+        for (_, part), (logits, _) in zip(table.partners, found[len(parts) :], strict=True):
+            there[part] = logits
+        return here, worth, there
 
     def _draws(self, seed: int) -> torch.Tensor:
         """float32 [T, 2, kitchens] in [0, 1): for the learner and for the partner of each kitchen."""
         generator = torch.Generator(self.device).manual_seed(seed)
         shape = (self.horizon, 2, self.batch.size)
         return torch.rand(shape, generator=generator, device=self.device)
-
-    def _partners(self, learner: Policy, pairings: Sequence[Pairing], *, skip_own: bool) -> torch.Tensor:
-        """float32 [kitchens, 6]: the partners' logits for what they see; the learner's may be left out."""
-        across = torch.from_numpy(self._across).to(self.device)
-        logits = torch.empty(self.batch.size, len(ACTIONS), device=self.device)
-        start = 0
-        for pairing in pairings:
-            part = slice(start, start + pairing.kitchens)
-            start += pairing.kitchens
-            if pairing.partner is not None or not skip_own:
-                logits[part] = (pairing.partner or learner)(across[part])[0]
-        return logits
 
     def _step(
         self, seats: NDArray[np.int64], chosen: torch.Tensor, answered: torch.Tensor

@@ -10,6 +10,7 @@ import torch
 
 from galley.errors import GalleyError
 from galley.kitchen.layout_file import find_layout
+from galley.learning.forwards import Machine
 from galley.learning.graph import PayoffTable
 from galley.learning.payoffs import games_with
 from galley.learning.populations.milestones import CHECKPOINTS
@@ -24,6 +25,7 @@ def run_payoffs(
     *,
     games: int = 5,
     seed: int = 0,
+    threads: int = 1,
     tell: Callable[[int, int], None] = lambda done, total: None,
 ) -> PayoffTable:
     """The payoffs of up to 50 checkpoints of a finished run, uniform along it, also written to payoffs.npz.
@@ -41,12 +43,13 @@ def run_payoffs(
     if len(names) < 2:
         raise GalleyError(f"{run}: has {len(names)} checkpoints; comparing takes at least 2")
     places = np.unique(np.linspace(0, len(names) - 1, min(CHECKPOINTS, len(names))).round().astype(int))
-    device = torch.device("cpu")
+    torch.set_num_threads(1)
+    machine = Machine(torch.device("cpu"), threads)
     chosen = [names[place] for place in places]
-    policies = [load_policy(run / "members" / f"{name}.pt", layout, device) for name in chosen]
+    policies = [load_policy(run / "members" / f"{name}.pt", layout, machine.device) for name in chosen]
     table = PayoffTable(chosen)
     for row, policy in enumerate(policies):
-        scores = games_with(layout, policy, policies[row:], games, derived_seed(seed, row), device)
+        scores = games_with(layout, policy, policies[row:], games, derived_seed(seed, row), machine)
         for column, (as_first, as_second) in enumerate(scores, row):
             table.measure(row, column, as_first)
             if column != row:

@@ -9,6 +9,7 @@ import torch
 from tqdm import tqdm
 
 from galley.kitchen import Layout
+from galley.learning.memory import keep_freed_memory
 from galley.learning.methods import Asked, described, machine_of, make
 from galley.learning.policy import Policy
 from galley.learning.run_folder import RunFolder
@@ -21,7 +22,8 @@ def train_run(asked: Asked, layout: Layout, path: Path) -> Policy:
     Raises:
         GalleyError: something asked for cannot be, or `path` holds another run.
     """
-    torch.set_num_threads(asked.threads)
+    torch.set_num_threads(1)
+    keep_freed_memory()
     training = make(asked, layout)
     folder = RunFolder(path, described(asked))
 

@@ -9,7 +9,8 @@ import torch
 from numpy.typing import NDArray
 
 from galley.kitchen import Layout
-from galley.learning.learner import Learner, Machine, kitchens_of
+from galley.learning.forwards import Machine
+from galley.learning.learner import Learner, kitchens_of
 from galley.learning.policy import Policy
 from galley.learning.populations.milestones import checkpoint
 from galley.learning.rollout import Episodes, Pairing, derived_seed
@@ -44,7 +45,7 @@ class BestResponse:
         self.alpha = alpha
         self.memory = memory
         self.learner = Learner(layout, settings, updates, derived_seed(seed, 30), machine)
-        self.episodes = Episodes(layout, kitchens_of(layout, settings), machine.device)
+        self.episodes = Episodes(layout, kitchens_of(layout, settings), machine)
         self.scores: NDArray[np.float64] = np.empty(0)
 
     @property

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from galley.errors import GalleyError
 from galley.kitchen import Layout
+from galley.learning.forwards import Machine
 from galley.learning.graph import (
     PayoffTable,
     accepted,
@@ -21,7 +22,7 @@ from galley.learning.graph import (
     removal,
     reward_solver,
 )
-from galley.learning.learner import Learner, Machine, kitchens_of
+from galley.learning.learner import Learner, kitchens_of
 from galley.learning.payoffs import games_with
 from galley.learning.policy import Policy
 from galley.learning.rollout import Episodes, Pairing, derived_seed
@@ -108,7 +109,7 @@ class Cole:
         self.learner = Learner(
             layout, settings, cole.generations * cole.updates, derived_seed(seed, 10), machine
         )
-        self.episodes = Episodes(layout, kitchens, machine.device)
+        self.episodes = Episodes(layout, kitchens, machine)
         self.generation = 0
         self.tried = 0
         self.made = 0
@@ -211,7 +212,7 @@ class Cole:
         self.members.append(policy)
         number = self.table.add(name)
         seed = derived_seed(self.seed, _PAYOFFS, self.learner.done)
-        scores = games_with(self.layout, policy, self.members, self.cole.games, seed, self.machine.device)
+        scores = games_with(self.layout, policy, self.members, self.cole.games, seed, self.machine)
         for other, games in enumerate(scores):
             self.table.measure(number, other, games[0])
             if other != number:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from galley.kitchen import Layout
-from galley.learning.learner import Machine
+from galley.learning.forwards import Machine
 from galley.learning.policy import Policy
 from galley.learning.populations.best_response import BestResponse
 from galley.learning.populations.milestones import STAGES

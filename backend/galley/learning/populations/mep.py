@@ -8,7 +8,7 @@ from typing import Any
 import torch
 
 from galley.kitchen import Layout
-from galley.learning.learner import Machine
+from galley.learning.forwards import Machine
 from galley.learning.payoffs import probabilities
 from galley.learning.policy import Policy
 from galley.learning.populations.best_response import BestResponse

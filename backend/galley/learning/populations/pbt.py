@@ -9,7 +9,8 @@ from typing import Any, Final
 import numpy as np
 
 from galley.kitchen import Layout
-from galley.learning.learner import Learner, Machine, kitchens_of
+from galley.learning.forwards import Machine
+from galley.learning.learner import Learner, kitchens_of
 from galley.learning.payoffs import games_with
 from galley.learning.policy import Policy
 from galley.learning.populations.milestones import checkpoint
@@ -53,7 +54,7 @@ class PBT:
             Learner(layout, settings, updates, derived_seed(seed, 60, number), machine)
             for number in range(size)
         ]
-        self.episodes = Episodes(layout, kitchens_of(layout, settings), machine.device)
+        self.episodes = Episodes(layout, kitchens_of(layout, settings), machine)
         self.done = 0
         self.total = size * updates
         self.scores = [0.0] * size
@@ -116,7 +117,7 @@ class PBT:
             float(
                 games_with(
                     self.layout, policy, policies, self.games, derived_seed(self.seed, 62, turn, number),
-                    self.machine.device,
+                    self.machine,
                 ).mean()
             )
             for number, policy in enumerate(policies)

@@ -6,7 +6,8 @@ from collections.abc import Callable
 from typing import Any
 
 from galley.kitchen import Layout
-from galley.learning.learner import Bonus, Learner, Machine, kitchens_of
+from galley.learning.forwards import Machine
+from galley.learning.learner import Bonus, Learner, kitchens_of
 from galley.learning.policy import Policy
 from galley.learning.populations.milestones import Milestones, checkpoint
 from galley.learning.rollout import Episodes, Pairing, derived_seed
@@ -24,7 +25,7 @@ class SelfPlay:
         self, layout: Layout, settings: PPOSettings, updates: int, seed: int, machine: Machine
     ) -> None:
         self.learner = Learner(layout, settings, updates, derived_seed(seed, 10), machine)
-        self.episodes = Episodes(layout, kitchens_of(layout, settings), machine.device)
+        self.episodes = Episodes(layout, kitchens_of(layout, settings), machine)
         self.milestones = Milestones(updates)
         self.milestones.note(0, 0.0, self.learner.policy)
 
