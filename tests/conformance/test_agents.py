@@ -21,10 +21,8 @@ from galley.workspace import Workspace
 WORKSPACE = Workspace(Path(__file__).resolve().parents[2])
 CATALOGUE = Catalogue(WORKSPACE)
 TICKS = 120
-SLOW = ("centralized",)
-"""They search for many seconds before the first tick."""
-
 QUICK = ("cramped_room", "counter_circuit")
+QUICK_CENTRALIZED = ("cramped_room",)
 
 
 def cases() -> Iterator[object]:
@@ -32,7 +30,9 @@ def cases() -> Iterator[object]:
     for name in CATALOGUE.names():
         bundle = CATALOGUE.bundle(name)
         for layout in bundle.layouts or WORKSPACE.names("layouts"):
-            quick = bundle.kind == "network" or (layout in QUICK and name not in SLOW)
+            quick = bundle.kind == "network" or layout in (
+                QUICK_CENTRALIZED if name == "centralized" else QUICK
+            )
             marks = () if quick else (pytest.mark.full, pytest.mark.timeout(1800))
             yield pytest.param(name, layout, id=f"{name}-{layout}", marks=marks)
 

@@ -1,206 +1,159 @@
-"""One plan for both chefs, and the agent that plays its part in it."""
+"""The agent that plays its part in a plan for both chefs."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from galley.errors import GalleyError
-from galley.kitchen.codes import CELLS, CHEF, DELIVERIES, HELD, ORDERS_DELIVERED, POT_TICKS, STAY
+from galley.kitchen.codes import CELLS, CHEF, DELIVERIES, HELD, POT_TICKS, STAY
 from galley.kitchen.layout import Layout
 from galley.kitchen.rules import step
 from galley.kitchen.trajectory import start
-from galley.planning.brain import brain
-from galley.planning.myopic import Myopic
-from galley.planning.team_kernel import LEG_TICKS, Search, search_plan
+from galley.planning.robots import QMDP
+from galley.planning.team import TeamPlan, TeamPlanner, TeamSearch
 
-ORDERS_AHEAD = 3
-"""Orders planned for at a time when there is no order list."""
-BEYOND = 3
-"""Orders after those whose likely cost counts, so that a plan leaves the kitchen prepared."""
-WIDTH = 64
-"""Nodes kept per tick in the search for a plan that nobody waits for."""
-WIDTH_SMALL = 100
-"""The same in a kitchen of at most `SMALL` floor cells."""
-SMALL = 12
-WIDTH_PLAYING = 24
-"""The same for an agent's first plan, made before the round begins."""
-WIDTH_AFRESH = 2
-"""The same for every later plan, which must be there within a tick."""
-PAIRS_SMALL = 30
-PAIRS_AFRESH = 6
-ORDERS_AFRESH = 1
-PAIRS = 16
-"""Pairs of subtasks tried from each node."""
+WIDTH_AHEAD = 36
+"""Nodes kept per tick in the search for the next plan."""
+PAIRS_AHEAD = 10
+"""Pairs of subtasks tried from each."""
+TICKS_AHEAD = 200
+"""The length of the longest next plan."""
+LEAD_TICKS = 24
+"""Ticks over which the search for the next plan is spread, at least."""
+NODES_PER_TICK = 165
+"""Nodes of it in a tick, at most: what a decision may take."""
+TRIAL_TICKS = 2
+"""Ticks for which a quick plan has to be followed before a better one is searched for."""
+WIDTH_QUICK = 4
+"""The same for the plan that is there at once: at the start, and when the world is not as planned."""
+PAIRS_QUICK = 8
+ORDERS_QUICK = 1
+NODES_QUICK = 400
 PATIENCE_TICKS = 12
-"""Ticks without anything taken, put or served after which an agent whose partner does not play its part
-goes on as the myopic human until the next soup is served."""
-MOST_TICKS = 300
-"""The length of the longest plan searched for."""
-
-
-@dataclass(frozen=True, eq=False)
-class TeamPlan:
-    """Joint actions uint8[T, 2] and the states int16[T + 1, S] they lead through.
-
-    `complete` is False when the search reached its limit before the orders were served; the plan
-    then leads to the most promising state found.
-    """
-
-    joint_actions: NDArray[np.uint8]
-    states: NDArray[np.int16]
-    complete: bool
-
-
-class TeamPlanner:
-    """Near-optimal joint plans on one layout, by A* over pairs of subtasks with joint motion costs.
-
-    Raises:
-        GalleyError: the layout cannot be served (the message names the station) or is too large.
-    """
-
-    def __init__(self, layout: Layout) -> None:
-        self.layout = layout
-        self._brain = brain(layout, 0, team=True)
-        self._searches: dict[int, Search] = {}
-
-    def plan(
-        self,
-        state: NDArray[np.int16],
-        orders: int | None = None,
-        width: int | None = None,
-        pairs: int | None = None,
-        most_ticks: int = MOST_TICKS,
-    ) -> TeamPlan:
-        """The plan from `state` (int16[S]) until `orders` more soups are served (else `ORDERS_AHEAD`).
-
-        No more than what is left of an order list; the orders after them count by their likely cost.
-
-        Raises:
-            GalleyError: less than one order or tick is asked for.
-        """
-        listed = self.layout.rules.orders
-        left = None if listed is None else len(listed) - int(state[ORDERS_DELIVERED])
-        known = ORDERS_AHEAD + BEYOND if left is None else left
-        wanted = min(known, ORDERS_AHEAD) if orders is None else orders
-        if wanted < 1 or (width is not None and width < 1) or most_ticks < 1:
-            raise GalleyError("a plan needs at least one order, one node a tick and one tick")
-        beyond = max(0, min(BEYOND, known - wanted))
-        thorough = width is None and len(self.layout.floor) <= SMALL
-        if width is None:
-            width = WIDTH_SMALL if thorough else WIDTH
-        if pairs is None:
-            pairs = PAIRS_SMALL if thorough else PAIRS
-        search = self._search(width, most_ticks)
-        node, complete = search_plan(self._brain, search, state, wanted, beyond, pairs, thorough)
-        legs = []
-        while search.parents[node] >= 0:
-            legs.append(search.legs[node, : search.lengths[node]])
-            node = int(search.parents[node])
-        actions = np.concatenate([*legs[::-1], np.empty((0, 2), dtype=np.uint8)])
-        states = np.empty((len(actions) + 1, state.size), dtype=np.int16)
-        states[0] = state
-        out = np.zeros(4, dtype=np.int32)
-        for tick, (act0, act1) in enumerate(actions.tolist()):
-            states[tick + 1] = states[tick]
-            step(self.layout.spec, states[tick + 1], act0, act1, out)
-        return TeamPlan(actions, states, bool(complete))
-
-    def _search(self, width: int, ticks: int) -> Search:
-        key = width * 100_000 + ticks
-        keys = 1 << min(20, (width * ticks * PAIRS).bit_length())
-        if key not in self._searches:
-            nodes = width * ticks
-            size = self.layout.width * self.layout.height + 9
-            self._searches[key] = Search(
-                states=np.zeros((nodes, size), dtype=np.int16),
-                parents=np.zeros(nodes, dtype=np.int32),
-                legs=np.zeros((nodes, LEG_TICKS, 2), dtype=np.uint8),
-                lengths=np.zeros(nodes, dtype=np.int16),
-                totals=np.zeros(nodes, dtype=np.float32),
-                counts=np.zeros(ticks, dtype=np.int32),
-                keys=np.zeros(keys, dtype=np.uint64),
-                times=np.zeros(keys, dtype=np.int16),
-            )
-        return self._searches[key]
+"""Ticks without anything taken, put or served, since a plan broke, after which the agent goes on alone."""
+BROKEN_PLANS = 6
+"""Plans broken since the last soup after which it does so as well."""
 
 
 class Centralized:
     """An agent that plays its part in a plan for both chefs, trusting the other to play theirs.
 
-    The plan is carried out open-loop. When the world is not as planned, a new plan is made from there, and
-    from then on every plan is a quick one; without an order list there is a new plan after each soup served.
-    Who waits in vain for a partner that does not play its part cooks one soup as the myopic human does.
+    A plan is carried out open-loop. Meanwhile, a little in each tick, the next one is searched for, from a
+    state to which this one leads: where a soup is served, sooner if this is a quick plan. When the world is
+    not as planned, a quick plan is made from there at once. An agent that is let down again and again goes on
+    as the QMDP robot does until a soup is served; the next time until two are, then four, and so on.
 
-    Source: Fontaine et al. 2021 (RSS), Sec. IV "Centralized Planning".
+    Everything is a function of layout, seat, seed and what was observed. Two such agents have one plan, as
+    only what an agent does alone depends on its seat.
+
+    Source: Fontaine et al. 2021 (RSS), Sec. IV "Centralized Planning". Ours: planning ahead, going on alone.
     """
 
     def __init__(self) -> None:
-        self._layout: Layout | None = None
         self._planner: TeamPlanner | None = None
-        self._seat = 0
-        self._plan: TeamPlan | None = None
-        self._at, self._deviated, self._stalled = 0, False, 0
-        self._made = np.zeros(0, dtype=np.int16)
-        self._alone = Myopic()
+        self._alone = QMDP()
 
     def reset(self, layout: Layout, seat: int, seed: int) -> None:
-        """Begin an episode with a plan; the seed settles random moves of an agent that waited in vain.
+        """Begin an episode with a quick plan; the seed settles random moves of an agent on its own.
 
         Raises:
             GalleyError: the layout cannot be served (the message names the station) or is too large.
         """
-        if self._planner is None or layout != self._layout:
+        if self._planner is None or layout != self._planner.layout:
             self._planner = TeamPlanner(layout)
-            self._layout = layout
+            self._quick = self._planner.search(WIDTH_QUICK, PAIRS_QUICK)
+            self._ahead = self._planner.search(WIDTH_AHEAD, PAIRS_AHEAD, TICKS_AHEAD)
         self._seat = seat
-        self._plan, self._at = self._planner.plan(start(layout), width=WIDTH_PLAYING), 0
-        self._deviated, self._stalled = False, 0
-        self._made = np.full(3 + layout.width * layout.height, -1, dtype=np.int16)
         self._alone.reset(layout, seat, seed)
+        self._alone.act(start(layout), 0)  # its kernels are fetched now, not in the middle of a round
+        self._vain_ticks, self._broken = 0, 0
+        self._soups_alone, self._alone_until = 1, 0
+        self._out = np.zeros(4, dtype=np.int32)
+        self._take_up_quick(start(layout))
 
     def act(self, state: NDArray[np.int16], tick: int) -> int:
         """This seat's part in the plan's next joint action; to stay when no plan leads on."""
-        self._plan, self._at, self._deviated = plan, at, _ = self._current(state)
-        if self._deviated and self._stalled >= PATIENCE_TICKS:
+        self._ready()
+        if self._is_alone(state):
             return self._alone.act(state, tick)
+        plan, at = self._plan, self._at
+        if not _holds(plan, at, state):  # not what followed from what was observed
+            plan, at = _made_at_once(self._quick, state), 0
         return int(plan.joint_actions[at, self._seat]) if at < len(plan.joint_actions) else STAY
 
     def observe(self, state: NDArray[np.int16], joint_action: tuple[int, int]) -> None:
-        """Move on in the plan that was in force in `state`."""
-        self._plan, at, self._deviated = self._current(state)
-        self._at = at + 1
+        """Move on in the plan, or make another where what both did is not as planned."""
+        layout = self._ready().layout
+        after = state.copy()
+        step(layout.spec, after, *joint_action, self._out)
         self._alone.observe(state, joint_action)
-        now = _made(state, self._made.size)
-        if self._stalled >= PATIENCE_TICKS:  # until the next soup is served
-            self._stalled = self._stalled if now[2] == self._made[2] else 0
+        if self._is_alone(state):
+            if not self._is_alone(after):
+                self._take_up_quick(after)
+            return
+        if not _holds(self._plan, self._at, state):
+            self._take_up_quick(state)
+        self._at += 1
+        holds = _holds(self._plan, self._at, after)
+        if after[DELIVERIES] > state[DELIVERIES]:
+            self._broken = 0
+        self._broken += not holds
+        if not np.array_equal(_made(state), _made(after)):
+            self._vain_ticks = 0
+        elif self._vain_ticks > 0 or not holds:
+            self._vain_ticks += 1
+        if self._vain_ticks >= PATIENCE_TICKS or self._broken >= BROKEN_PLANS:
+            self._alone_until = int(after[DELIVERIES]) + self._soups_alone
+            self._soups_alone *= 2
+            self._vain_ticks, self._broken = 0, 0
+        elif not holds:
+            self._take_up_quick(after)
         else:
-            self._stalled = self._stalled + 1 if np.array_equal(now, self._made) else 0
-        self._made = now
+            self._plan_ahead(after)
 
-    def _current(self, state: NDArray[np.int16]) -> tuple[TeamPlan, int, bool]:
-        """The plan in force in a state, the place of the state in it, and whether the world ever deviated."""
-        if self._planner is None or self._plan is None:
+    def _is_alone(self, state: NDArray[np.int16]) -> bool:
+        return bool(state[DELIVERIES] < self._alone_until)
+
+    def _take_up_quick(self, state: NDArray[np.int16]) -> None:
+        self._plan, self._at = _made_at_once(self._quick, state), 0
+        self._next_at = min(TRIAL_TICKS + LEAD_TICKS, len(self._plan.joint_actions))
+        self._begin_at = TRIAL_TICKS if self._next_at > TRIAL_TICKS else self._next_at
+
+    def _plan_ahead(self, state: NDArray[np.int16]) -> None:
+        """Nothing; works on the next plan, and takes it up if it is due in `state`."""
+        if self._at == self._next_at:
+            plan = self._ahead.plan() if self._begin_at < self._next_at else None
+            served = [] if plan is None else plan.served_at
+            if plan is None or not served:
+                self._take_up_quick(state)
+                return
+            self._plan, self._at, self._begin_at = plan, 0, 0
+            self._next_at = next((at for at in served if at >= LEAD_TICKS), len(plan.joint_actions))
+        if self._at == self._begin_at:
+            nodes = NODES_PER_TICK * (self._next_at - self._at)
+            self._ahead.begin(self._plan.states[self._next_at], most_nodes=nodes)
+        if self._at >= self._begin_at:
+            self._ahead.go_on(NODES_PER_TICK)
+
+    def _ready(self) -> TeamPlanner:
+        if self._planner is None:
             raise GalleyError("the agent has no layout yet; call reset first")
-        plan, at = self._plan, self._at
-        if at >= len(plan.states) or not np.array_equal(plan.states[at], state):
-            return _afresh(self._planner, state), 0, True
-        served = state[DELIVERIES] > plan.states[0][DELIVERIES]
-        listed = self._planner.layout.rules.orders is not None
-        if at < len(plan.joint_actions) and (listed or not served):
-            return plan, at, self._deviated
-        return _afresh(self._planner, state), 0, self._deviated
+        return self._planner
 
 
-def _afresh(planner: TeamPlanner, state: NDArray[np.int16]) -> TeamPlan:
-    return planner.plan(state, orders=ORDERS_AFRESH, width=WIDTH_AFRESH, pairs=PAIRS_AFRESH)
+def _made_at_once(search: TeamSearch, state: NDArray[np.int16]) -> TeamPlan:
+    search.begin(state, ORDERS_QUICK, NODES_QUICK)
+    return search.plan()
 
 
-def _made(state: NDArray[np.int16], size: int) -> NDArray[np.int16]:
+def _holds(plan: TeamPlan, at: int, state: NDArray[np.int16]) -> bool:
+    return at < len(plan.states) and np.array_equal(plan.states[at], state)
+
+
+def _made(state: NDArray[np.int16]) -> NDArray[np.int16]:
     """int16[3 + H*W]: what is held, soups served, what lies about and is in pots, cooking times left out."""
-    found = np.empty(size, dtype=np.int16)
-    found[0], found[1], found[2] = state[HELD], state[CHEF + HELD], state[DELIVERIES]
-    found[3:] = state[CELLS:] % POT_TICKS
-    return found
+    made = np.empty(3 + state.size - CELLS, dtype=np.int16)
+    made[:3] = state[HELD], state[CHEF + HELD], state[DELIVERIES]
+    made[3:] = state[CELLS:] % POT_TICKS
+    return made

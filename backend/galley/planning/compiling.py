@@ -31,7 +31,8 @@ def lean_kernel(function: Function) -> Function:
 
 
 def _compiled(function: Function, counted: bool) -> Function:
-    compiled: Any = njit(cache=True, _nrt=counted)(function)
+    compile_it: Any = njit  # `_nrt`, whether holders are counted, is not in its annotations
+    compiled: Any = compile_it(cache=True, _nrt=counted)(function)
     files = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
     if files is not None:  # absent with NUMBA_DISABLE_JIT=1
         files._source_stamp = (files._source_stamp, _written())

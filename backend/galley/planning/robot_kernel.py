@@ -84,6 +84,8 @@ CROWDED_TICKS = 4
 """Added to both ways when no joint plan ends both, for instance two chefs bound for one narrow spot."""
 WAIT_TICKS = 3.0
 """Added to the cost of waiting: the values know no crowd, where a robot would put its work off for ever."""
+FARTHER_TICKS = 1.0
+"""Added for each nearer tile of the same subtask: the values are not so exact that a longer way gains."""
 LEAST = 0.1
 """The weight of an action that leads one tick away from a subtask, beside 1 + LEAST for one that changes
 nothing and 2 + LEAST for one that leads a tick towards it."""
@@ -285,7 +287,7 @@ def choose(
         count = feasible[kind, 0] if kind != WAIT else 1
         for index in range(count):
             cell = -1 if kind == WAIT else int(feasible[kind, 1 + index])
-            cost = 0.0
+            cost = FARTHER_TICKS * index
             for human in range(KINDS):
                 if weights[human] > 0:
                     cost += weights[human] * _cost_to_go(brain, state, seat, kind, cell, human, cells[human])

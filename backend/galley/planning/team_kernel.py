@@ -37,6 +37,23 @@ PROBES = 64
 LATER_TICKS = 10
 """How much later a plan may end than the first one found if the kitchen is then better prepared."""
 
+FILL_WORK = 20
+"""Nodes that take as long as to fill a table of joint motion."""
+
+# The progress of a search, int64 [PROGRESS].
+ORDERS = 0
+BEYOND = 1
+PAIRS = 2
+THOROUGH = 3
+AT_TICK = 4
+AT_PLACE = 5
+BEST_END = 6
+FIRST_END = 7
+BEST_NODE = 8
+NODES = 9
+MOST_NODES = 10
+PROGRESS = 11
+
 
 class Search(NamedTuple):
     """Space for a search of T ticks with a beam of W nodes a tick; a node's number is tick * W + place."""
@@ -49,6 +66,8 @@ class Search(NamedTuple):
     counts: NDArray[int32]  # [T], nodes in each tick
     keys: NDArray[uint64]  # [K], states met
     times: NDArray[int16]  # [K], when first
+    progress: NDArray[int64]  # [PROGRESS], what is asked and how far the search is
+    least: NDArray[float64]  # [1], the cost to go of the most promising node
 
 
 @lean_kernel
@@ -148,22 +167,44 @@ def _place(search: Search, tick: int, total: float) -> int:
 
 
 @kernel
-def search_plan(
-    brain: Brain, search: Search, start: NDArray[int16], orders: int, beyond: int, pairs: int,
-    thorough: bool,
-) -> tuple[int, bool]:  # fmt: skip
-    """(node, whether it is the end): the last node of the best plan for `orders` more soups from `start`.
+def begin_search(
+    search: Search, start: NDArray[int16], orders: int, beyond: int, pairs: int, thorough: bool,
+    most_nodes: int,
+) -> None:  # fmt: skip
+    """Nothing; makes ready for a plan for `orders` more soups from `start`.
 
     With `beyond` more orders to follow the plan is the one after which those are likely to be served soonest.
-
-    Of each node the `pairs` most promising pairs of subtasks are tried, in three ways each. When the beam
-    runs out of ticks the node of the best estimate is given, and False.
+    Of each node the `pairs` most promising pairs of subtasks are tried, in three ways each; the search ends
+    at the latest after `most_nodes`.
     """
-    ticks = search.counts.size
-    width = search.parents.size // ticks
     search.counts[:] = 0
     search.keys[:] = 0
-    state = start.copy()
+    search.counts[0] = 1
+    search.states[0] = start
+    search.parents[0] = -1
+    search.lengths[0] = 0
+    search.totals[0] = 0
+    search.least[0] = np.inf
+    search.progress[:] = 0
+    search.progress[BEST_END] = -1
+    search.progress[ORDERS] = orders
+    search.progress[BEYOND] = beyond
+    search.progress[PAIRS] = pairs
+    search.progress[THOROUGH] = thorough
+    search.progress[MOST_NODES] = most_nodes
+
+
+@kernel
+def search_on(brain: Brain, search: Search, work: int) -> bool:
+    """Whether the search is done, after `work` more nodes; a table of joint motion counts as `FILL_WORK`.
+
+    What is found does not depend on how the work is divided: `BEST_END` in its progress is the last node of
+    the best plan, or -1 if ticks or nodes ran out before; then `BEST_NODE` is the one of the best estimate.
+    """
+    progress = search.progress
+    ticks = search.counts.size
+    width = search.parents.size // ticks
+    state = np.empty(search.states.shape[1], dtype=np.int16)
     leg = np.zeros((LEG_TICKS, 2), dtype=np.uint8)
     out = np.zeros(4, dtype=np.int32)
     options = np.zeros((2, KINDS, 4), dtype=np.int16)
@@ -172,75 +213,92 @@ def search_plan(
     most = (KINDS * 3 + 1) ** 2
     rated = np.empty(most, dtype=np.float64)
     which = np.empty((most, 5), dtype=np.int64)
-    served = start[DELIVERIES]
-    search.counts[0] = 1
-    search.states[0] = start
-    search.parents[0] = -1
-    search.lengths[0] = 0
-    search.totals[0] = 0
-    best_end = -1
-    first_end = 0
-    best_node = 0
-    best_left = np.inf
-    for tick in range(ticks):
-        if best_end >= 0 and (beyond == 0 or tick > first_end + LATER_TICKS):
+    served = search.states[0, DELIVERIES]
+    done = 0
+    while progress[AT_TICK] < ticks and progress[NODES] < progress[MOST_NODES]:
+        tick = progress[AT_TICK]
+        late = progress[BEYOND] == 0 or tick > progress[FIRST_END] + LATER_TICKS
+        if progress[BEST_END] >= 0 and late:
+            return True
+        if progress[AT_PLACE] >= search.counts[tick]:
+            progress[AT_TICK] += 1
+            progress[AT_PLACE] = 0
+            continue
+        if done >= work:
+            return False
+        node = tick * width + progress[AT_PLACE]
+        progress[AT_PLACE] += 1
+        now = search.states[node]
+        left = progress[ORDERS] - (now[DELIVERIES] - served)
+        if left <= 0 or finished(brain.spec, now):
+            if progress[BEST_END] < 0:
+                progress[FIRST_END] = tick
+                progress[BEST_END] = node
+            elif search.totals[node] < search.totals[progress[BEST_END]]:
+                progress[BEST_END] = node
+            continue
+        if tick > 0 and search.totals[node] - tick < search.least[0]:
+            search.least[0] = search.totals[node] - tick
+            progress[BEST_NODE] = node
+        filled = brain.joint.used[0]
+        to_go(brain, now, left, progress[BEYOND], progress[THOROUGH] != 0, options, summed)
+        found = _rate_pairs(brain, now, left + progress[BEYOND], options, rated, which, summed, ahead)
+        order = np.argsort(rated[:found])
+        for index in range(min(progress[PAIRS], found)):
+            _expand(brain, search, node, which[order[index]], state, leg, out, ahead, summed)
+        progress[NODES] += 1
+        done += 1
+        if brain.joint.used[0] != filled:
+            done += FILL_WORK * max(1, brain.joint.used[0] - filled)
+    return True
+
+
+@lean_kernel
+def _expand(
+    brain: Brain, search: Search, node: int, pick: NDArray[int64], state: NDArray[int16],
+    leg: NDArray[uint8], out: NDArray[int32], ahead: NDArray[int16], summed: NDArray[int16],
+) -> None:  # fmt: skip
+    """Nothing; adds the nodes to which a pair of subtasks, as in `_rate_pairs`, leads from a node."""
+    ticks = search.counts.size
+    tick = node // (search.parents.size // ticks)
+    thorough = search.progress[THOROUGH] != 0
+    wait0 = pick[0] == WAIT
+    wait1 = pick[2] == WAIT
+    most0 = MOST_POSES if thorough and not wait0 else 0
+    most1 = MOST_POSES if thorough and not wait1 else 0
+    for which0 in range(-1, most0):
+        end0 = -1 if which0 < 0 else brain.joint.ends[1 + pick[1], which0]
+        if which0 >= 0 and end0 < 0:
             break
-        for place in range(search.counts[tick]):
-            node = tick * width + place
-            now = search.states[node]
-            left = orders - (now[DELIVERIES] - served)
-            if left <= 0 or finished(brain.spec, now):
-                if best_end < 0:
-                    first_end = tick
-                    best_end = node
-                elif search.totals[node] < search.totals[best_end]:
-                    best_end = node
-                continue
-            if tick > 0 and search.totals[node] - tick < best_left:
-                best_left = search.totals[node] - tick
-                best_node = node
-            to_go(brain, now, left, beyond, thorough, options, summed)
-            found = _rate_pairs(brain, now, left + beyond, options, rated, which, summed, ahead)
-            order = np.argsort(rated[:found])
-            for index in range(min(pairs, found)):
-                pick = which[order[index]]
-                wait0 = pick[0] == WAIT
-                wait1 = pick[2] == WAIT
-                most0 = MOST_POSES if thorough and not wait0 else 0
-                most1 = MOST_POSES if thorough and not wait1 else 0
-                for which0 in range(-1, most0):
-                    end0 = -1 if which0 < 0 else brain.joint.ends[1 + pick[1], which0]
-                    if which0 >= 0 and end0 < 0:
-                        break
-                    for which1 in range(-1, most1):
-                        end1 = -1 if which1 < 0 else brain.joint.ends[1 + pick[3], which1]
-                        if which1 >= 0 and end1 < 0:
-                            break
-                        for first in range(2, -1, -1):
-                            # The right of way matters only where the chefs are in each other's way.
-                            if first < 2 and (wait0 or wait1 or (pick[4] == 0 and not thorough)):
-                                continue
-                            state[:] = now
-                            length = walk(
-                                brain, state, pick[1], pick[3], wait0, wait1, end0, end1, first, leg, out
-                            )
-                            then = tick + length
-                            if length == 0 or then >= ticks or _met_before(search, _key(state), then):
-                                continue
-                            still = max(0, orders - (state[DELIVERIES] - served))
-                            total = float(then)
-                            if still + beyond > 0:
-                                total += to_go(brain, state, still, beyond, thorough, ahead, summed)
-                            new = _place(search, then, total)
-                            if new >= 0:
-                                search.states[new] = state
-                                search.parents[new] = node
-                                search.legs[new, :length] = leg[:length]
-                                search.lengths[new] = length
-                                search.totals[new] = total
-    if best_end >= 0:
-        return best_end, True
-    return best_node, False
+        for which1 in range(-1, most1):
+            end1 = -1 if which1 < 0 else brain.joint.ends[1 + pick[3], which1]
+            if which1 >= 0 and end1 < 0:
+                break
+            for first in range(2, -1, -1):
+                # The right of way matters only where the chefs are in each other's way.
+                if first < 2 and (wait0 or wait1 or (pick[4] == 0 and not thorough)):
+                    continue
+                for index in range(state.size):
+                    state[index] = search.states[node, index]
+                length = walk(brain, state, pick[1], pick[3], wait0, wait1, end0, end1, first, leg, out)
+                then = tick + length
+                if length == 0 or then >= ticks or _met_before(search, _key(state), then):
+                    continue
+                served = state[DELIVERIES] - search.states[0, DELIVERIES]
+                still = max(0, search.progress[ORDERS] - served)
+                total = float(then)
+                if still + search.progress[BEYOND] > 0:
+                    total += to_go(brain, state, still, search.progress[BEYOND], thorough, ahead, summed)
+                new = _place(search, then, total)
+                if new >= 0:
+                    for index in range(state.size):
+                        search.states[new, index] = state[index]
+                    for index in range(length):
+                        search.legs[new, index, 0] = leg[index, 0]
+                        search.legs[new, index, 1] = leg[index, 1]
+                    search.parents[new] = node
+                    search.lengths[new] = length
+                    search.totals[new] = total
 
 
 @lean_kernel
