@@ -53,6 +53,26 @@ def test_what_is_not_touched_is_not_sent(opened: Open) -> None:
     assert set(submitted(page)) == {"step"}
 
 
+def test_the_word_of_the_chosen_point_is_seen_whole_on_a_phone(opened: Open) -> None:
+    page = opened("questionnaire")
+    page.set_viewport_size({"width": 360, "height": 740})
+    points = page.locator(".worded .point input")
+    assert points.count() == 5
+    for number in range(5):
+        points.nth(number).check(force=True)
+        word = page.locator(".worded .point input:checked ~ .word")
+        word.evaluate("word => { word.textContent = 'strongly prefer the second'; }")
+        seen = word.evaluate(
+            """word => {
+              const box = word.closest(".scale-box"), at = word.getBoundingClientRect();
+              const ends = [...box.querySelectorAll(".end")].map((end) => end.getBoundingClientRect().bottom);
+              const inside = at.bottom <= box.getBoundingClientRect().bottom + 1;
+              return inside && word.scrollHeight <= word.clientHeight + 1 && at.top >= Math.max(...ends) - 1;
+            }"""
+        )
+        assert seen, number
+
+
 def test_a_line_answers_by_a_press_in_its_middle(opened: Open) -> None:
     page = opened("questionnaire")
     page.locator(".line-input").click()

@@ -59,6 +59,32 @@ def test_a_press_is_sent_once_however_long_it_lasts(server: Server, page: Page) 
     assert numbers == sorted(set(numbers))
 
 
+@pytest.mark.parametrize("touch", [True, False])
+@pytest.mark.parametrize(("width", "height"), [(844, 390), (320, 568), (568, 320), (390, 844), (1024, 600)])
+def test_the_button_of_a_card_is_seen_whole_on_every_screen(
+    browser: Browser, width: int, height: int, touch: bool
+) -> None:
+    context = browser.new_context(
+        viewport={"width": width, "height": height}, has_touch=touch, is_mobile=touch
+    )
+    small = context.new_page()
+    played = Server(small, PAGES)
+    small.goto(f"{HOST}/round")
+    played.wait_for("hello")
+    played.say(KEYFRAME)
+    button = small.locator("[data-part=card-button]")
+    expect(button).to_be_in_viewport(ratio=1)
+    seen = button.evaluate(
+        """button => {
+          const at = button.getBoundingClientRect(), card = button.closest(".card").getBoundingClientRect();
+          const low = document.elementFromPoint(at.x + at.width / 2, at.bottom - 4);
+          return card.top <= at.top && at.bottom <= card.bottom && low?.closest("button") === button;
+        }"""
+    )
+    context.close()
+    assert seen
+
+
 def test_losing_the_keyboard_lets_go_of_everything(server: Server, page: Page) -> None:
     playing(server)
     page.keyboard.down("ArrowLeft")
