@@ -96,15 +96,9 @@ def main() -> None:
 
     def learn() -> None:
         update(
-            learner.policy,
-            learner.optimiser,
-            rollout,
-            settings,
-            progress=0,
-            shaping=1,
-            seed=0,
-            bf16=args.bf16,
-        )
+            learner.policy, learner.optimiser, rollout, settings,
+            progress=0, shaping=1, seed=0, machine=machine,
+        )  # fmt: skip
 
     cooking_s = best(cook, args.repeats)
     playing_s = best(lambda: episodes.play(learner.policy, pairings, 0), args.repeats)

@@ -23,16 +23,20 @@ _BLOCK = 64
 def differing(seen: NDArray[uint8], map_: NDArray[uint8], places: NDArray[int32]) -> int:
     """How many numbers of `seen` differ from `map_`, both uint8 [C*H*W]; fills `places` with where."""
     found = 0
-    for start in range(0, seen.size, _BLOCK):
-        end = min(start + _BLOCK, seen.size)
-        different = uint8(0)
-        for place in range(start, end):
+    whole = seen.size // _BLOCK * _BLOCK
+    for start in range(0, whole, _BLOCK):  # always of one length, so that it is compared in one go
+        different = 0
+        for place in range(start, start + _BLOCK):
             different |= seen[place] ^ map_[place]
         if different:
-            for place in range(start, end):
+            for place in range(start, start + _BLOCK):
                 if seen[place] != map_[place]:
                     places[found] = place
                     found += 1
+    for place in range(whole, seen.size):
+        if seen[place] != map_[place]:
+            places[found] = place
+            found += 1
     return found
 
 
