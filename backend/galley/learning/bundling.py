@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import platform
-import subprocess
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from pathlib import Path
@@ -65,7 +64,7 @@ def export(
         weights = {key: tensor.numpy() for key, tensor in load_tensors(run / "members" / "best.pt").items()}
         content = filled(grid_onnx(weights, Encoder(layout, ENCODING).shape))
         (folder / f"{layout.name}.onnx").write_bytes(content)
-        facts[layout.name] = {"asked": one, **_made(run), "scores": {}}
+        facts[layout.name] = {"asked": one, **_made(run), "commit": one.pop("commit", ""), "scores": {}}
         facts[layout.name]["ticks"] += sum(_made(Path(made))["ticks"] for made in one["pool"])
     (folder / "agent.yaml").write_text(_description(name, list(facts), unstuck_after_ticks), "utf-8")
     bundle = load_bundle(folder, folder.as_posix())
@@ -86,7 +85,6 @@ def _made(run: Path) -> dict[str, Any]:
         "processor": _processor(),
         "torch": version("torch"),
         "galley": version("galley"),
-        "commit": _commit(),
     }
 
 
@@ -135,15 +133,3 @@ def _processor() -> str:
         return platform.processor() or platform.machine()
     names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
     return names[0] if names else platform.machine()
-
-
-def _commit() -> str:
-    """The commit of the source that made it, or nothing outside a checkout."""
-    try:
-        found = subprocess.run(
-            ["git", "rev-parse", "--short=12", "HEAD"],  # noqa: S607
-            cwd=Path(__file__).parent, capture_output=True, text=True, check=True,
-        )  # fmt: skip
-    except (OSError, subprocess.CalledProcessError):
-        return ""
-    return found.stdout.strip()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import os
+import subprocess
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -56,7 +57,8 @@ class RunFolder:
             self._compare(described, asked)
         else:
             (path / "members").mkdir(parents=True, exist_ok=True)
-            _write(described, (json.dumps(asked, indent=2, sort_keys=True) + "\n").encode())
+            told = {**asked, "commit": _commit()}
+            _write(described, (json.dumps(told, indent=2, sort_keys=True) + "\n").encode())
 
     def load(self) -> dict[str, Any] | None:
         """The last state that was saved, None at the beginning of a run.
@@ -115,7 +117,8 @@ class RunFolder:
         except ValueError as error:
             raise GalleyError(f"{described}: is no JSON ({error}); remove the folder to start anew") from None
         wanted = json.loads(json.dumps(asked))
-        differing = sorted(key for key in {*known, *wanted} if known.get(key) != wanted.get(key))
+        names = {*known, *wanted} - {"commit"}  # of the source that began the run
+        differing = sorted(key for key in names if known.get(key) != wanted.get(key))
         if differing:
             told = ", ".join(f"{key} {known.get(key)!r} (asked: {wanted.get(key)!r})" for key in differing)
             raise GalleyError(
@@ -187,3 +190,15 @@ def _write(path: Path, content: bytes) -> None:
     part = path.with_name(f".{path.name}.part")
     part.write_bytes(content)
     part.replace(path)
+
+
+def _commit() -> str:
+    """The commit of this source, or nothing outside a checkout."""
+    try:
+        found = subprocess.run(
+            ["git", "rev-parse", "--short=12", "HEAD"],  # noqa: S607
+            cwd=Path(__file__).parent, capture_output=True, text=True, check=True,
+        )  # fmt: skip
+    except (OSError, subprocess.CalledProcessError):
+        return ""
+    return found.stdout.strip()
