@@ -106,7 +106,8 @@ def main() -> None:
     payoffs_s = best(lambda: games_with(layout, learner.policy, partners, cole.games, 0, machine), 1)
     ticks = kitchens * episodes.horizon
     update_s = playing_s + learning_s
-    total_s = cole.generations * (cole.updates * update_s + payoffs_s)
+    sizes = [min(number + 1, cole.cap) for number in range(cole.generations)]
+    total_s = cole.generations * cole.updates * update_s + payoffs_s * sum(sizes) / cole.cap
     figures = [
         ("ticks per second", ticks / update_s, "1/s"),
         ("share of the kitchen", 100 * cooking_s / update_s, "%"),
@@ -114,7 +115,8 @@ def main() -> None:
         ("share of learning", 100 * learning_s / update_s, "%"),
         ("rows learned from per second, forward and back", settings.epochs * ticks / learning_s, "1/s"),
         ("payoffs of a strategy with 50 others", payoffs_s, "s"),
-        (f"{cole.generations} generations on {LAYOUT}", total_s / 60, "min"),
+        ("updates of all generations", cole.generations * cole.updates * update_s / 60, "min"),
+        ("all generations with their payoffs", total_s / 60, "min"),
         ("largest memory", resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, "MiB"),
     ]
     where = f"{args.device}{', bf16' if args.bf16 else ''}, {args.threads} threads"

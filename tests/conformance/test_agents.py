@@ -112,7 +112,14 @@ def test_the_agents_of_the_demo_ship() -> None:
 )
 def test_networks_come_with_a_card(name: str) -> None:
     card = (CATALOGUE.bundle(name).path / "card.md").read_text("utf-8")
-    for told in ("Data", "SHA-256", "Command", "--seed", "held out", "score"):
+    if name.startswith("human"):
+        expected = ["Data", "SHA-256", "Command", "--seed", "held out", "score"]
+    else:
+        layouts = CATALOGUE.bundle(name).layouts or ()
+        expected = ["--seed", "of the paper's", "minutes", "commit", "with itself", "human-proxy"]
+        expected += [f"galley learn train {name} --layout {layout}" for layout in layouts]
+        expected += [f"| {layout} | " for layout in layouts]
+    for told in expected:
         assert told in card
 
 
