@@ -14,6 +14,7 @@ import torch
 from galley.errors import GalleyError
 from galley.kitchen import Layout
 from galley.learning.policy import Policy
+from galley.learning.populations import pbt
 from galley.learning.populations.best_response import BestResponse, priorities
 from galley.learning.populations.cole import Cole, ColeSettings
 from galley.learning.populations.fcp import FCP
@@ -76,12 +77,16 @@ def weights(policy: Policy) -> list[torch.Tensor]:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_stopped_run_ends_as_an_unbroken_one(method: str, tmp_path: Path) -> None:
+def test_a_stopped_run_ends_as_an_unbroken_one(
+    method: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pbt, "games_with", first_is_best)
     make = METHODS[method]
+    extra = (2,) if method == "pbt" else ()  # past its first selection
     whole = finish(make, tmp_path / "whole")
     assert whole.finished
     assert whole.share == pytest.approx(1.0)
-    for stop in (0, 1, 1):
+    for stop in (0, 1, 1, *extra):
         finish(make, tmp_path / "broken", stop)
     again = finish(make, tmp_path / "broken")
     for one, other in zip(weights(whole.best()), weights(again.best()), strict=True):
@@ -199,6 +204,28 @@ def test_checkpoints_are_fifty_along_a_training() -> None:
         names = [name for done in range(1, updates + 1) if (name := checkpoint(done, updates))]
         assert names == [f"{number:04}" for number in range(1, 51)]
     assert [checkpoint(done, 3) for done in (1, 2, 3)] == ["0016", "0033", "0050"]
+
+
+def first_is_best(layout: object, policy: Policy, policies: list[Policy], *rest: object) -> np.ndarray:
+    return np.array([20 if policy is policies[0] else 0])
+
+
+def test_a_copied_policy_shares_nothing_with_its_model(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pbt, "games_with", first_is_best)
+    training = PBT(SMALL, QUICK, size=2, games=1, updates=4, seed=1, machine=CPU)
+    while training.done < 4:
+        training.step()
+    weights = [learner.policy.state_dict() for learner in training.learners]
+    assert all(torch.equal(weights[0][key], weights[1][key]) for key in weights[0])
+    assert training.scores == [20.0, 0.0]
+    assert training.learners[0].settings != training.learners[1].settings
+    places = [
+        {tensor.data_ptr() for kept in learner.optimiser.state.values() for tensor in kept.values()}
+        | {parameter.data_ptr() for parameter in learner.policy.parameters()}
+        for learner in training.learners
+    ]
+    assert len(places[0]) == len(places[1]) > 50
+    assert not places[0] & places[1]
 
 
 def test_pbt_pairs_everybody_with_everybody_in_a_round() -> None:

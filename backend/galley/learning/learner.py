@@ -87,9 +87,9 @@ class Learner:
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Nothing; goes back to where `state` was taken."""
+        """Nothing; goes back to where `state` was taken, which may be another learner's that learns on."""
         self.policy.load_state_dict(state["policy"])
-        self.optimiser.load_state_dict(state["optimiser"])
+        self.optimiser.load_state_dict(copy.deepcopy(state["optimiser"]))  # PyTorch would share the tensors
         self.done = int(state["done"])
         self.seed = int(state["seed"])
 
