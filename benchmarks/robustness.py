@@ -1,15 +1,13 @@
 """How far the measures of a kitchen hold when the human errs: the harness of Table I of the LSI paper.
 
-    python benchmarks/robustness.py          a table
-    python benchmarks/robustness.py --json   one JSON object a figure: name, value, unit, command
+    python benchmarks/robustness.py              a table
+    python benchmarks/robustness.py --json       one JSON object a figure: name, value, unit, command
+    python benchmarks/robustness.py --first 200  the same for the 60 kitchens of seeds 200 to 259
 
-On 60 seeded random kitchens a QMDP robot and a myopic human cook 50 trials of 100 ticks (two onion orders).
-The medians of each measure without noise place the kitchens; then everything is run again with other seeds at
-each epsilon. A figure is Spearman's rank correlation of both, its 95% interval from 2,000 bootstrap samples
-of kitchens, and its p value times the 25 tests (Bonferroni).
-
-The kitchens are those of seeds 100 to 159. The first set drawn, 0 to 59, gave the same order but for one pair
-of figures, see docs/planning.md.
+On 60 seeded random kitchens, those of seeds 0 to 59, a QMDP robot and a myopic human cook 200 trials of
+100 ticks (two onion orders). The medians of each measure without noise place the kitchens; then all is run
+again with other seeds at each epsilon. A figure is Spearman's rank correlation of both, its 95% interval from
+2,000 bootstrap samples of kitchens, and its p value times the 25 tests (Bonferroni).
 
 Source: Fontaine et al. 2021 (RSS), Sec. VI and Table I.
 """
@@ -29,9 +27,10 @@ sys.path.insert(0, str(ROOT))
 
 from benchmarks.random_kitchens import random_kitchen  # noqa: E402
 from galley.analysis.evaluate import Team, evaluate  # noqa: E402
+from galley.kitchen import Layout  # noqa: E402
 
 KITCHENS = 60
-FIRST_SEED = 100
+TRIALS = 200
 EPSILONS = (0.0, 0.05, 0.1, 0.2, 0.5)
 MEASURES = (
     "ingredients_difference",
@@ -43,10 +42,10 @@ MEASURES = (
 SAMPLES = 2000
 
 
-def medians(epsilon: float, seed: int) -> dict[str, np.ndarray]:
+def medians(kitchens: list[Layout], epsilon: float, seed: int, trials: int) -> dict[str, np.ndarray]:
     """The median of each measure in each kitchen, float64 [KITCHENS]."""
-    team = Team(epsilon=epsilon, seed=seed)
-    found = [evaluate(random_kitchen(FIRST_SEED + number), team)["measures"] for number in range(KITCHENS)]
+    team = Team(epsilon=epsilon, seed=seed, trials=trials)
+    found = [evaluate(kitchen, team)["measures"] for kitchen in kitchens]
     return {name: np.array([one[name]["median"] for one in found]) for name in MEASURES}
 
 
@@ -61,16 +60,20 @@ def main() -> None:
     """Print every correlation, and a line on stderr where more noise does not mean less correlation."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--json", action="store_true")
-    as_json = parser.parse_args().json
-    command = "python benchmarks/robustness.py"
-    placed = medians(0.0, 0)
+    parser.add_argument("--first", type=int, default=0, help="the seed of the first kitchen")
+    parser.add_argument("--trials", type=int, default=TRIALS, help="trials in each kitchen")
+    options = parser.parse_args()
+    as_json = options.json
+    command = f"python benchmarks/robustness.py --first {options.first} --trials {options.trials}"
+    kitchens = [random_kitchen(options.first + number) for number in range(KITCHENS)]
+    placed = medians(kitchens, 0.0, 0, options.trials)
     random = np.random.default_rng(0)
     samples = random.integers(KITCHENS, size=(SAMPLES, KITCHENS))
     rho: dict[tuple[str, float], float] = {}
     if not as_json:
         print(f"{'epsilon':8}" + "".join(f"{name:>36}" for name in MEASURES))
     for number, epsilon in enumerate(EPSILONS):
-        noisy = medians(epsilon, 1 + number)
+        noisy = medians(kitchens, epsilon, 1 + number, options.trials)
         row = f"{epsilon:<8}"
         for name in MEASURES:
             value = correlation(placed[name], noisy[name])

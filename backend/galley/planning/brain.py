@@ -59,6 +59,10 @@ _PLACES = {
 }
 """Where a chef is at each stand."""
 
+MOST_FLOOR_FOR_ALL_COUNTERS = 40
+CENTRAL_COUNTERS = 4
+"""In a kitchen with more floor cells, the counters over which a team may pass things."""
+
 
 def brain(layout: Layout, seat: int, team: bool = False) -> Brain:
     """All that a robot on `seat` needs to know of a layout; its joint motion tables are still empty.
@@ -102,7 +106,22 @@ def brain(layout: Layout, seat: int, team: bool = False) -> Brain:
         human_takes=human_takes,
         unit=np.array([unit]),
         pots=np.array([pots, int(passes)]),
+        passing=_passing(known, passes),
     )
+
+
+def _passing(known: Distances, needed: bool) -> NDArray[np.bool_]:
+    """bool[H*W]: the counters that both chefs reach; in a large kitchen where nothing has to be passed over
+    them only the most central, as each takes tables of joint motion with every station."""
+    layout = known.layout
+    shared: NDArray[np.bool_] = known.reachable.all(axis=0) & (layout.tiles.ravel() == COUNTER)
+    if needed or len(layout.floor) <= MOST_FLOOR_FOR_ALL_COUNTERS:
+        return shared
+    cells = np.flatnonzero(shared)
+    ways = np.where(known.costs[:, cells] < 0, 0, known.costs[:, cells]).sum(axis=0, dtype=np.int64)
+    central = np.zeros_like(shared)
+    central[cells[np.argsort(ways, kind="stable")[:CENTRAL_COUNTERS]]] = True
+    return central
 
 
 def durations(known: Distances, seat: int) -> NDArray[np.float64]:

@@ -105,6 +105,7 @@ class Brain(NamedTuple):
     human_takes: NDArray[float64]
     unit: NDArray[float64]  # [1]
     pots: NDArray[int64]  # [2]: how many there are, and 1 where chefs must pass things over counters
+    passing: NDArray[bool_]  # [H*W]: the counters over which a team may pass things
 
 
 @lean_kernel

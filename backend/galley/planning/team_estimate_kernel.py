@@ -64,7 +64,7 @@ def _pass_counters(
         summed[cell] = -1
         if own[cell] >= 0 and theirs[cell] >= 0:
             summed[cell] = own[cell] + theirs[cell]
-            if brain.spec[SPEC_TILES + cell] == COUNTER and state[CELLS + cell] == NOTHING:
+            if brain.passing[cell] and state[CELLS + cell] == NOTHING:
                 add_tile(out, DROP, cell, summed)
 
 

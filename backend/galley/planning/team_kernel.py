@@ -37,7 +37,7 @@ PROBES = 64
 LATER_TICKS = 10
 """How much later a plan may end than the first one found if the kitchen is then better prepared."""
 
-FILL_WORK = 20
+FILL_WORK = 8
 """Nodes that take as long as to fill a table of joint motion."""
 
 # The progress of a search, int64 [PROGRESS].
