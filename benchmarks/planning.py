@@ -22,10 +22,12 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
+from galley.agents.protocol import Agent  # noqa: E402
 from galley.analysis.evaluate import Team, evaluate, play_trials  # noqa: E402
 from galley.kitchen import Kitchen, Layout  # noqa: E402
 from galley.kitchen.layout_file import load_layout  # noqa: E402
 from galley.kitchen.measures import measures  # noqa: E402
+from galley.planning.centralized import Centralized  # noqa: E402
 from galley.planning.joint_motion import JointMotion  # noqa: E402
 from galley.planning.robots import QMDP  # noqa: E402
 from tests.planning.package import package_planner  # noqa: E402
@@ -79,13 +81,12 @@ def trials_s() -> float:
     return taken
 
 
-def decisions_ms(ticks: int = 3000) -> np.ndarray:
-    """Processor milliseconds of each QMDP decision (observe and act) beside a myopic human."""
+def decisions_ms(robot: Agent, ticks: int) -> np.ndarray:
+    """Processor milliseconds of each decision (observe and act) of a robot beside a myopic human."""
     layout = OPEN.with_rules(horizon_ticks=ticks, orders=None)
     human = (
         play_trials(layout, Team(orders=(), trials=1, horizon_ticks=ticks))[0].joint_actions[:, 1].tolist()
     )
-    robot = QMDP()
     robot.reset(layout, 0, 0)
     kitchen = Kitchen(layout)
     times = []
@@ -120,9 +121,11 @@ def figures() -> Iterator[tuple[str, float, str, str]]:
     trials_s()
     yield "ready to act, open 15x10 kitchen", min(ready_s() for _ in range(3)), "s", "<= 0.5"
     yield "50 trials of 100 ticks, QMDP and myopic", min(trials_s() for _ in range(3)), "s", "<= 1.5"
-    times = decisions_ms()
-    yield "QMDP decision, p99", float(np.quantile(times, 0.99)), "ms", "< 5"
-    yield "QMDP decision, worst", float(times.max()), "ms", ""
+    decisions_ms(Centralized(), 200)
+    for name, robot, ticks, bar in (("QMDP", QMDP(), 3000, "< 5"), ("centralized", Centralized(), 1000, "")):
+        times = decisions_ms(robot, ticks)
+        yield f"{name} decision, p99", float(np.quantile(times, 0.99)), "ms", bar
+        yield f"{name} decision, worst", float(times.max()), "ms", ""
     ring = load_layout(ROOT / "layouts" / "counter_circuit.yaml")
     yield "joint motion of all pairs of stations, counter_circuit", joint_plans_s(ring), "s", ""
     yield "overcooked-ai 1.1.0 joint motion, counter_circuit", package_planner(ring)[1], "s", ""
