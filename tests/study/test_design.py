@@ -68,11 +68,11 @@ def test_cole_pairs_everyone_meets_the_focal_agent_and_one_baseline_on_every_lay
         baseline = plan.condition["baseline"]
         assert met(plan, "layout") == tuple(layout for layout in order for _ in range(2))
         pairs = [met(plan, "agent")[n : n + 2] for n in range(0, 10, 2)]
-        assert all(set(pair) == {"human-bc", baseline} for pair in pairs)
+        assert all(set(pair) == {"cole-sv", baseline} for pair in pairs)
         assert all(len({step.data["human_seat"] for step in rounds(plan)[n : n + 2]}) == 1 for n in (0, 4, 8))
-        first += sum(pair[0] == "human-bc" for pair in pairs)
+        first += sum(pair[0] == "cole-sv" for pair in pairs)
         comparison = next(step for step in plan.steps if step.kind == "comparison")
-        assert {comparison.data[which]["agent"] for which in ("first", "second")} == {"human-bc", baseline}
+        assert {comparison.data[which]["agent"] for which in ("first", "second")} == {"cole-sv", baseline}
         assert rounds(plan)[0].data["bonus"] == {"amount": 5.0, "unit": "CNY"}
     assert set(Counter(plan.condition["baseline"] for plan in given).values()) == {40}
     drawn = 5 * len(given)
@@ -83,7 +83,7 @@ def test_hats_and_agents_are_independent_over_400_assignments() -> None:
     """Chi-square of hat by agent; with 2 x 7 hats 6 degrees of freedom: 99.9% of draws stay below 22.5."""
     study = load_study(Workspace(ROOT), "cole-pairs")
     given = plans(study, 400)
-    focal = Counter(plan.hats["human-bc"] for plan in given)
+    focal = Counter(plan.hats["cole-sv"] for plan in given)
     other = Counter(plan.hats[plan.condition["baseline"]] for plan in given)
     expected = 400 / 7
     for counts in (focal, other):
