@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Any, Final, Literal, get_args
+from typing import Any, Final
 
 import torch
 
@@ -24,8 +24,7 @@ from galley.learning.settings import PPOSettings, constants
 from galley.learning.training import Training
 from galley.names import name_fix
 
-Method = Literal["sp", "pbt", "fcp", "mep", "cole-sv", "cole-r"]
-METHODS: Final[tuple[str, ...]] = get_args(Method)
+METHODS: Final = ("sp", "pbt", "fcp", "mep", "cole-sv", "cole-r")
 RATIOS: Final = {"0:4": (0, 4), "1:3": (1, 3), "2:2": (2, 2), "3:1": (3, 1)}
 
 FCP_SEEDS: Final = 8

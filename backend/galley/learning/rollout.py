@@ -59,7 +59,7 @@ class _Table:
 
 
 class Episodes:
-    """A place to play: `kitchens` kitchens of one layout from reset to horizon, buffers kept between calls.
+    """A place to play: `kitchens` kitchens of one layout from reset to horizon.
 
     Raises:
         GalleyError: the layout has an order list, with which episodes would end at different ticks.
@@ -77,7 +77,6 @@ class Episodes:
         self.encoder = Encoder(layout, ENCODING)
         self.horizon = layout.rules.horizon_ticks
         self.batch = KitchenBatch(layout, kitchens)
-        self._across = np.empty((kitchens, *self.encoder.shape), dtype=np.uint8)
 
     @torch.inference_mode()
     def play(self, learner: Policy, pairings: Sequence[Pairing], seed: int, *, both: bool = False) -> Rollout:

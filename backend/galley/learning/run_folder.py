@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 import subprocess
 from collections.abc import Mapping
 from pathlib import Path
@@ -16,6 +15,7 @@ from torch.utils.tensorboard import SummaryWriter
 from galley.errors import GalleyError
 from galley.kitchen import Layout
 from galley.learning.policy import Policy
+from galley.learning.whole_file import whole_file
 
 COLUMNS: Final = (
     "ticks",
@@ -178,18 +178,13 @@ def load_tensors(path: Path) -> dict[str, Any]:
 
 def save_tensors(path: Path, content: Mapping[str, Any]) -> None:
     """Nothing; writes a file that `torch.load` reads, whole or not at all."""
-    part = path.with_name(f".{path.name}.part")
-    with part.open("wb") as file:
+    with whole_file(path) as file:
         torch.save(dict(content), file)
-        file.flush()
-        os.fsync(file.fileno())
-    part.replace(path)
 
 
 def _write(path: Path, content: bytes) -> None:
-    part = path.with_name(f".{path.name}.part")
-    part.write_bytes(content)
-    part.replace(path)
+    with whole_file(path) as file:
+        file.write(content)
 
 
 def _commit() -> str:

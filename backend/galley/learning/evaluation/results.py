@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -14,6 +13,7 @@ import numpy as np
 import pydantic
 
 from galley.errors import GalleyError
+from galley.learning.whole_file import whole_file
 
 Key = tuple[str, str, str]
 """Layout, the agent on seat 0, the agent on seat 1."""
@@ -111,13 +111,8 @@ class Results:
     def save(self, path: Path) -> None:
         """Nothing; writes all cells to `path` (JSON), whole or not at all."""
         text = json.dumps(_File(cells=list(self)).model_dump(), separators=(",", ":"))
-        path.parent.mkdir(parents=True, exist_ok=True)
-        part = path.with_name(f".{path.name}.part")
-        with part.open("w", encoding="utf-8") as file:
-            file.write(text.replace('{"layout"', '\n{"layout"') + "\n")
-            file.flush()
-            os.fsync(file.fileno())
-        part.replace(path)
+        with whole_file(path) as file:
+            file.write((text.replace('{"layout"', '\n{"layout"') + "\n").encode())
 
     @classmethod
     def load(cls, path: Path) -> Results:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from galley.errors import GalleyError
+from galley.learning.whole_file import whole_file
 
 _PARTS = ("names", "mean", "standard_error", "games")
 
@@ -146,14 +146,9 @@ class PayoffTable:
 
     def save(self, path: Path) -> None:
         """Nothing; writes the table to `path` (.npz), whole or not at all."""
-        path.parent.mkdir(parents=True, exist_ok=True)
-        part = path.with_name(f".{path.name}.part")
-        with part.open("wb") as file:
+        with whole_file(path) as file:
             names = np.array(self.names, dtype=np.str_)
             np.savez(file, names=names, mean=self.mean, standard_error=self.standard_error, games=self.games)
-            file.flush()
-            os.fsync(file.fileno())
-        part.replace(path)
 
     @classmethod
     def load(cls, path: Path) -> PayoffTable:
