@@ -38,8 +38,13 @@ METHODS: dict[str, Callable[[], Training]] = {
     "fcp": lambda: FCP(SMALL, QUICK, seeds=2, self_play_updates=2, updates=3, seed=1, machine=CPU),
     "mep": lambda: MEP(SMALL, QUICK, size=2, self_play_updates=2, updates=3, seed=1, machine=CPU),
     "cole-sv": lambda: Cole(SMALL, QUICK, COLE, 1, CPU),
+    "cole-sv of a pool": lambda: Cole(SMALL, QUICK, COLE, 1, CPU, {"one": policy_of(1), "two": policy_of(2)}),
     "cole-r": lambda: Cole(SMALL, QUICK, ColeSettings("reward", generations=4, updates=1, games=1), 1, CPU),
 }
+
+
+def policy_of(seed: int) -> Policy:
+    return Policy(SMALL, torch.Generator().manual_seed(seed)).requires_grad_(False)
 
 
 def folder_at(path: Path) -> RunFolder:
@@ -154,6 +159,19 @@ def test_a_pool_replaces_the_self_play_of_fcp() -> None:
         rows.append(training.step().row)
     assert [row["stage"] for row in rows] == ["best response"] * 2
     assert list(training.population) == ["one", "two"]
+
+
+def test_a_pool_is_the_first_population_of_cole() -> None:
+    pool = {"one": Policy(SMALL).requires_grad_(False), "two": Policy(SMALL).requires_grad_(False)}
+    training = Cole(SMALL, QUICK, ColeSettings(generations=1, updates=1, games=1), 1, CPU, pool)
+    assert training.table.names == ["one", "two"]
+    assert not training.table.missing()
+    assert len(training.phi) == 2
+    weights = training.learner.policy.state_dict()
+    assert all(torch.equal(weights[name], tensor) for name, tensor in pool["two"].state_dict().items())
+    while not training.finished:
+        training.step()
+    assert training.table.names == ["one", "two", "0001"]
 
 
 def test_mep_pays_for_what_the_population_rarely_does() -> None:

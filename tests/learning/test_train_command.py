@@ -71,7 +71,7 @@ def train(workspace: Path, *words: str) -> Path:
         (Asked("sp", "tiny", device="tpu"), "device 'tpu' is unknown; use cpu or cuda"),
         (Asked("mep", "tiny", population=1), "population is 1; use 2 to 64"),
         (Asked("sp", "tiny", changes=(("clip", -1.0),)), "clip is -1"),
-        (Asked("pbt", "tiny", pool=("runs/x",)), "--pool gives FCP its population"),
+        (Asked("pbt", "tiny", pool=("runs/x",)), "--pool gives FCP and COLE a population"),
         (Asked("fcp", "tiny", pool=("runs/absent",)), "runs/absent: is no run"),
         (Asked("cole-sv", "tiny", changes=(("ticks", 20.0),)), "too few for ratio"),
     ],
@@ -127,6 +127,10 @@ def test_runs_become_an_agent_with_a_card(workspace: Path) -> None:
     assert facts["tiny"]["scores"]["itself"][2] == 100
     again = train(workspace, "fcp", "--layout", "tiny", "--scale", "0.00002", "--pool", str(run))
     assert "--pool" in command(json.loads((again / "run.json").read_text()))
+    response = export(workspace, [again], "response").path
+    assert "galley learn train sp --layout tiny --seed 0" in (response / "card.md").read_text()
+    facts = json.loads((response / "training.json").read_text())
+    assert facts["tiny"]["ticks"] > 320
     with pytest.raises(GalleyError, match="one method, not fcp and sp"):
         export(workspace, [run, again], "both")
     with pytest.raises(GalleyError, match="of one layout"):

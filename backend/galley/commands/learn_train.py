@@ -48,7 +48,9 @@ def train(
     ] = None,
     pool: Annotated[
         list[str] | None,
-        typer.Option(metavar="RUN", help="FCP: a finished self-play run for the population, once each."),
+        typer.Option(
+            metavar="RUN", help="FCP, COLE: a finished run of sp for the first population, once each."
+        ),
     ] = None,
     no_wpg: Annotated[
         bool, typer.Option("--no-wpg", help="COLE: leave the weighted PageRank out (ablation).")

@@ -66,6 +66,8 @@ def export(
         (folder / f"{layout.name}.onnx").write_bytes(content)
         facts[layout.name] = {"asked": one, **_made(run), "commit": one.pop("commit", ""), "scores": {}}
         facts[layout.name]["ticks"] += sum(_made(Path(made))["ticks"] for made in one["pool"])
+        facts[layout.name]["seconds"] += sum(_made(Path(made))["seconds"] for made in one["pool"])
+        facts[layout.name]["pool"] = [run_asked(Path(made)) for made in one["pool"]]
     (folder / "agent.yaml").write_text(_description(name, list(facts), unstuck_after_ticks), "utf-8")
     bundle = load_bundle(folder, folder.as_posix())
     for layout in layouts:

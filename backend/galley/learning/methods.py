@@ -94,7 +94,8 @@ def make(asked: Asked, layout: Layout) -> Training:
             layout, settings, size=asked.population or MEP_SIZE, self_play_updates=updates,
             updates=round(MEP_RESPONSE * updates), seed=seed, machine=machine,
         )  # fmt: skip
-    return Cole(layout, settings, cole_of(asked), seed, machine)
+    first = pooled(asked.pool, layout, machine.device)
+    return Cole(layout, settings, cole_of(asked), seed, machine, first)
 
 
 def settings_of(asked: Asked) -> tuple[PPOSettings, float]:
@@ -107,8 +108,8 @@ def settings_of(asked: Asked) -> tuple[PPOSettings, float]:
         raise GalleyError(f"method {asked.method!r} is unknown; {name_fix(asked.method, METHODS)}")
     if not 0 < asked.scale <= 10:
         raise GalleyError(f"scale is {asked.scale}; use a number above 0 and at most 10")
-    if asked.pool and asked.method != "fcp":
-        raise GalleyError(f"--pool gives FCP its population; method {asked.method} makes its own")
+    if asked.pool and asked.method not in ("fcp", "cole-sv", "cole-r"):
+        raise GalleyError(f"--pool gives FCP and COLE a population; method {asked.method} makes its own")
     if asked.population is not None and not 1 < asked.population <= 64:
         raise GalleyError(f"population is {asked.population}; use 2 to 64")
     known = constants(asked.layout)

@@ -28,7 +28,8 @@ def training_card(name: str, facts: Mapping[str, Any], unstuck_after_ticks: int 
     )
     made = "\n".join(_made_row(layout, one) for layout, one in facts.items())
     scored = "\n".join(_scored_row(layout, one) for layout, one in facts.items())
-    commands = "\n".join(command(one["asked"]) for one in facts.values())
+    asked = [wish for one in facts.values() for wish in (*one.get("pool", ()), one["asked"])]
+    commands = "\n".join(map(command, asked))
     return f"""# {name}
 
 {title}. Source: {source}. The method and its constants are told in `docs/learning.md`.

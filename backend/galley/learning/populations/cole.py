@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
@@ -83,10 +83,10 @@ _FIRST: Final = "0000"
 class Cole:
     """COLE-SV and COLE-R.
 
-    The population begins with one untrained strategy. A generation goes on from the strategy before it, with
-    kitchens dealt to itself and to partners drawn by SUCG for every update; then the payoffs of the new
-    strategy with all others are measured on both seats. If its preference centrality does not rank among the
-    best, its updates go on, up to the given tries.
+    The population begins with `first`, policies by name, or with one untrained strategy. A generation goes on
+    from the strategy before it, with kitchens dealt to itself and to partners drawn by SUCG for every update;
+    then the payoffs of the new strategy with all others are measured on both seats. If its preference
+    centrality does not rank among the best, its updates go on, up to the given tries.
 
     Source: COLE paper, Algorithm 1.
 
@@ -95,7 +95,13 @@ class Cole:
     """
 
     def __init__(
-        self, layout: Layout, settings: PPOSettings, cole: ColeSettings, seed: int, machine: Machine
+        self,
+        layout: Layout,
+        settings: PPOSettings,
+        cole: ColeSettings,
+        seed: int,
+        machine: Machine,
+        first: Mapping[str, Policy] | None = None,
     ) -> None:
         problems = cole.problems()
         kitchens = kitchens_of(layout, settings)
@@ -113,11 +119,14 @@ class Cole:
         self.generation = 0
         self.tried = 0
         self.made = 0
-        self.phi: NDArray[np.float64] = np.ones(1)
-        self.visits: NDArray[np.int64] = np.zeros(1, dtype=np.int64)
+        self.first = dict(first or {_FIRST: self.learner.frozen()})
+        self.visits: NDArray[np.int64] = np.zeros(len(self.first), dtype=np.int64)
         self.table = PayoffTable()
         self.members: list[Policy] = []
-        self._join(_FIRST)
+        for name, policy in self.first.items():
+            self._join(name, policy)
+        self.learner.policy.load_state_dict(self.members[-1].state_dict())
+        self.phi = self._solved()
 
     @property
     def finished(self) -> bool:
@@ -165,7 +174,7 @@ class Cole:
         self.phi, self.visits = state["phi"].numpy().copy(), state["visits"].numpy().copy()
         arrays = {part: state[part].numpy() for part in ("mean", "standard_error", "games")}
         self.table = PayoffTable.from_arrays({"names": np.array(state["names"], dtype=np.str_), **arrays})
-        self.members = [self.members[0] if name == _FIRST else member(name) for name in self.table.names]
+        self.members = [self.first[name] if name in self.first else member(name) for name in self.table.names]
 
     def best(self) -> Policy:
         """The strategy of the last generation."""
@@ -185,7 +194,7 @@ class Cole:
         """The policy that joined at the end of a generation, by its name; none if it is to be tried again."""
         self.made = 0
         name = f"{self.generation + 1:04}"
-        number = self._join(name)
+        number = self._join(name, self.learner.frozen())
         ranked = accepted(preference_centrality(self.table.payoffs()), number, self.cole.share)
         self.tried += 1
         if not ranked and self.tried < self.cole.tries and number + 1 >= self.cole.tries_from:
@@ -206,12 +215,11 @@ class Cole:
         self.phi = self._solved()
         return {name: self.members[-1]}
 
-    def _join(self, name: str) -> int:
-        """The number of the learner's present policy in the population, its payoffs measured."""
-        policy = self.learner.frozen()
+    def _join(self, name: str, policy: Policy) -> int:
+        """The number of a policy in the population, its payoffs measured."""
         self.members.append(policy)
         number = self.table.add(name)
-        seed = derived_seed(self.seed, _PAYOFFS, self.learner.done)
+        seed = derived_seed(self.seed, _PAYOFFS, self.learner.done, number)
         scores = games_with(self.layout, policy, self.members, self.cole.games, seed, self.machine)
         for other, games in enumerate(scores):
             self.table.measure(number, other, games[0])
