@@ -167,8 +167,6 @@ def test_a_pool_is_the_first_population_of_cole() -> None:
     assert training.table.names == ["one", "two"]
     assert not training.table.missing()
     assert len(training.phi) == 2
-    weights = training.learner.policy.state_dict()
-    assert all(torch.equal(weights[name], tensor) for name, tensor in pool["two"].state_dict().items())
     while not training.finished:
         training.step()
     assert training.table.names == ["one", "two", "0001"]

@@ -53,10 +53,12 @@ class Learner:
         *,
         both: bool = False,
         bonus: Bonus | None = None,
+        progress: float | None = None,
     ) -> tuple[Rollout, UpdateFigures]:
         """One update from one episode of every kitchen, shared out by `pairings`.
 
-        `bonus` gives the extra reward [T, N] of a rollout, after scaling.
+        `bonus` gives the extra reward [T, N] of a rollout, after scaling; `progress`, 0 to 1, sets rate and
+        weight of the entropy where it is not told by the number of updates.
         """
         rollout = episodes.play(self.policy, pairings, derived_seed(self.seed, 1, self.done), both=both)
         figures = update(
@@ -64,7 +66,7 @@ class Learner:
             self.optimiser,
             rollout,
             self.settings,
-            progress=self.progress,
+            progress=self.progress if progress is None else progress,
             shaping=shaping_weight(self.ticks, self.settings),
             seed=derived_seed(self.seed, 2, self.done),
             bonus=None if bonus is None else bonus(rollout),

@@ -35,8 +35,8 @@ MEP_RESPONSE: Final = 2.0
 
 QUICK: Final[dict[str, Any]] = {
     "ticks": 12_000,
-    "minibatches": 6,
-    "epochs": 4,
+    "minibatches": 12,
+    "epochs": 2,
     "clip": 0.2,
     "learning_rate": 1.5e-3,
     "final_rate_share": 0.2,
@@ -44,7 +44,7 @@ QUICK: Final[dict[str, Any]] = {
     "entropy_start": 0.02,
     "entropy_end": 0.002,
 }
-"""Constants with which a policy needs a fifth of the ticks: larger steps, updates four times as often."""
+"""Constants with which a policy needs a fifth of the ticks, and each costs a quarter: larger steps, fewer passes."""
 
 
 @dataclass(frozen=True)

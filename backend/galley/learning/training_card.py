@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict, fields
 from typing import Any, Final
 
+from galley.learning.methods import Asked, settings_of
 from galley.learning.settings import constants
 
 TITLES: Final[Mapping[str, tuple[str, str]]] = {
@@ -70,11 +72,20 @@ def command(asked: Mapping[str, Any]) -> str:
         if asked[option] is not None:
             words.append(f"--{option.replace('_', '-')} {asked[option]}")
     words += [f"--pool {run}" for run in asked["pool"]]
-    words += [f"--set {key}={value:g}" for key, value in asked["changes"].items()]
+    words += [f"--set {key}={value:g}" for key, value in _changes(asked).items()]
     words.append(f"--threads {asked['threads']}")
     words += [f"--device {asked['device']}"] if asked["device"] != "cpu" else []
     words += ["--bf16"] if asked["bf16"] else []
     return " ".join(words)
+
+
+def _changes(asked: Mapping[str, Any]) -> dict[str, float]:
+    """The constants that were asked for, and those whose defaults were others when the run was made."""
+    changes: dict[str, float] = dict(asked["changes"])
+    known = {field.name: asked[field.name] for field in fields(Asked) if field.name in asked}
+    known |= {"changes": tuple(sorted(changes.items())), "pool": tuple(asked["pool"])}
+    today = asdict(settings_of(Asked(**known))[0])
+    return changes | {name: value for name, value in asked["ppo"].items() if today[name] != value}
 
 
 def paper_ticks(method: str, layout: str) -> float:

@@ -83,10 +83,11 @@ _FIRST: Final = "0000"
 class Cole:
     """COLE-SV and COLE-R.
 
-    The population begins with `first`, policies by name, or with one untrained strategy. A generation goes on
-    from the strategy before it, with kitchens dealt to itself and to partners drawn by SUCG for every update;
-    then the payoffs of the new strategy with all others are measured on both seats. If its preference
-    centrality does not rank among the best, its updates go on, up to the given tries.
+    The population begins with `first`, policies by name, or with one untrained strategy. The first generation
+    begins untrained, each other goes on from the strategy before it, with kitchens dealt to itself and to
+    partners drawn by SUCG for every update; then the payoffs of the new strategy with all others are measured
+    on both seats. If its preference centrality does not rank among the best, its updates go on, up to the
+    given tries.
 
     Source: COLE paper, Algorithm 1.
 
@@ -125,7 +126,6 @@ class Cole:
         self.members: list[Policy] = []
         for name, policy in self.first.items():
             self._join(name, policy)
-        self.learner.policy.load_state_dict(self.members[-1].state_dict())
         self.phi = self._solved()
 
     @property
@@ -140,7 +140,7 @@ class Cole:
 
     def step(self) -> Told:
         """One update, and at the end of a generation the payoffs of its strategy."""
-        rollout, figures = self.learner.learn(self.episodes, self._pairings())
+        rollout, figures = self.learner.learn(self.episodes, self._pairings(), progress=self.share)
         self.made += 1
         row = row_of(
             self.learner, rollout, figures,
