@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import shutil
 import signal
@@ -149,6 +150,14 @@ def test_only_finished_runs_of_self_play_make_a_pool(workspace: Path, tmp_path: 
     RunFolder(tmp_path / "begun", {"method": "sp", "layout": "tiny"})
     with pytest.raises(GalleyError, match="is not finished"):
         export(workspace, [tmp_path / "begun"], "early")
+
+
+def test_two_processes_do_not_train_in_one_folder(workspace: Path) -> None:
+    run = train(workspace, "sp", "--layout", "tiny", "--scale", "0.00002")
+    with (run / "run.json").open() as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        with pytest.raises(GalleyError, match="another process trains here"):
+            train(workspace, "sp", "--layout", "tiny", "--scale", "0.00002")
 
 
 def test_the_same_command_goes_on_after_kill_9(workspace: Path) -> None:

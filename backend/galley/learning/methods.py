@@ -44,7 +44,7 @@ QUICK: Final[dict[str, Any]] = {
     "entropy_start": 0.02,
     "entropy_end": 0.002,
 }
-"""Constants with which a policy needs a fifth of the ticks, and each costs a quarter: larger steps, fewer passes."""
+"""Constants with which a policy needs a fifth of the ticks, at a quarter of the passes: larger steps."""
 
 
 @dataclass(frozen=True)
