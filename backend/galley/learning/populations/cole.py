@@ -140,7 +140,7 @@ class Cole:
 
     def step(self) -> Told:
         """One update, and at the end of a generation the payoffs of its strategy."""
-        rollout, figures = self.learner.learn(self.episodes, self._pairings(), progress=self.share)
+        rollout, figures = self.learner.learn(self.episodes, self._pairings(), both=True, progress=self.share)
         self.made += 1
         row = row_of(
             self.learner, rollout, figures,

@@ -30,9 +30,10 @@ FACTORS: Final = (0.75, 1.25)
 class PBT:
     """PBT: every ordered pair of the population trains once, in random order; then the worst is replaced.
 
-    In a pair the first learns with the second, who stays as it is; who meets itself plays both seats. After
-    size^2 pairings each policy plays `games` games on either seat with all others and itself; the policy with
-    the worst mean gets weights, optimiser and constants of the best, and the constants vary.
+    In a pair the first learns with the second, who stays as it is; who meets itself plays both seats and
+    learns from both. After size^2 pairings each policy plays `games` games on either seat with all others
+    and itself; the policy with the worst mean gets weights, optimiser and constants of the best, and the
+    constants vary.
 
     Source: Carroll et al. 2019 (arXiv:1910.05789), Sec. 4.1, App. C; Jaderberg et al. 2017
     (arXiv:1711.09846).
@@ -78,7 +79,7 @@ class PBT:
         learner = self.learners[number]
         partner = None if number == other else self.learners[other].frozen()
         pairing = Pairing(partner, self.episodes.batch.size)
-        rollout, figures = learner.learn(self.episodes, [pairing])
+        rollout, figures = learner.learn(self.episodes, [pairing], both=True)
         self.done += 1
         row = row_of(
             learner, rollout, figures,
