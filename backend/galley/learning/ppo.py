@@ -39,8 +39,7 @@ def advantages(
 
     Source: Schulman et al. 2016 (arXiv:1506.02438), eq. 16; an episode is worth nothing after its horizon.
     """
-    extra = rollout.shaping + settings.partner_shaping * rollout.partner_shaping
-    rewards = settings.reward_scale * (rollout.rewards + shaping * extra)
+    rewards = settings.reward_scale * (rollout.rewards + shaping * rollout.shaping)
     if bonus is not None:
         rewards = rewards + bonus
     found = torch.empty_like(rewards)

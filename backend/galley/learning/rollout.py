@@ -28,7 +28,7 @@ class Rollout:
     """What the learner saw, did and got: T ticks in N rows, a row being one seat of one kitchen.
 
     `seen` uint8 [T, N, 26, H, W], `actions` int64, `log_probabilities`, `values`, `rewards` (sparse) and
-    `shaping` float32 (for what the row's own seat did) and `partner_shaping`, all [T, N]; `seats` int64 [N]; `scores` int64 [kitchens]; `kitchens` int64 [N].
+    `shaping` float32, all [T, N]; `seats` int64 [N]; `scores` int64 [kitchens]; `kitchens` int64 [N].
     """
 
     seen: torch.Tensor
@@ -37,7 +37,6 @@ class Rollout:
     values: torch.Tensor
     rewards: torch.Tensor
     shaping: torch.Tensor
-    partner_shaping: torch.Tensor
     seats: NDArray[np.int64]
     kitchens: NDArray[np.int64]
     scores: NDArray[np.int64]
@@ -96,7 +95,7 @@ class Episodes:
         logits = torch.empty(self.horizon, rows, len(ACTIONS), device=self.device)
         values = torch.empty(self.horizon, rows, device=self.device)
         rewards = np.empty((self.horizon, size), dtype=np.float32)
-        shaping = np.empty((self.horizon, size, 2), dtype=np.float32)
+        shaping = np.empty((self.horizon, size), dtype=np.float32)
         self.batch.reset()
         for tick in range(self.horizon):
             here, worth, there = self._ask(table)
@@ -106,8 +105,7 @@ class Episodes:
             answered = choose(there, draws[tick, 1])
             actions[tick] = torch.cat([chosen, answered[table.own]])[:rows]
             rewards[tick] = self._step(table.seats, chosen, answered)
-            shaping[tick] = self.batch.shaping()
-        seats = np.concatenate([table.seats, 1 - table.seats[table.own]])[:rows]
+            shaping[tick] = self.batch.shaping().sum(axis=1)
         taken = torch.log_softmax(logits, dim=2).gather(2, actions.unsqueeze(2)).squeeze(2)
         return Rollout(
             seen=seen,
@@ -115,9 +113,8 @@ class Episodes:
             log_probabilities=taken,
             values=values,
             rewards=torch.from_numpy(rewards[:, kitchens]).to(self.device),
-            shaping=torch.from_numpy(shaping[:, kitchens, seats]).to(self.device),
-            partner_shaping=torch.from_numpy(shaping[:, kitchens, 1 - seats]).to(self.device),
-            seats=seats,
+            shaping=torch.from_numpy(shaping[:, kitchens]).to(self.device),
+            seats=np.concatenate([table.seats, 1 - table.seats[table.own]])[:rows],
             kitchens=kitchens,
             scores=rewards.sum(axis=0).astype(np.int64),
         )

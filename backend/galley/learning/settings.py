@@ -43,8 +43,6 @@ class PPOSettings:
     """What rewards are multiplied by before anything is learned from them, so that a soup is 1."""
     shaping_ticks: float = 2.5e6
     """Ticks over which the extra reward of `KitchenBatch.shaping` falls linearly to 0."""
-    partner_shaping: float = 1.0
-    """Share of the extra reward for what the partner did; 0 pays a chef for its own deeds alone."""
 
     def problems(self) -> list[str]:
         """What cannot be, each with its fix."""
@@ -55,7 +53,7 @@ class PPOSettings:
         for name in ("ticks", "minibatches", "epochs"):
             if getattr(self, name) < 1:
                 found.append(f"{name} is {getattr(self, name)}; use a whole number of at least 1")
-        for name in ("gamma", "lambda_", "final_rate_share", "partner_shaping"):
+        for name in ("gamma", "lambda_", "final_rate_share"):
             if not 0 <= getattr(self, name) <= 1:
                 found.append(f"{name} is {getattr(self, name)}; use a number from 0 to 1")
         for name in ("clip", "value_coefficient", "entropy_start", "entropy_end", "shaping_ticks"):
