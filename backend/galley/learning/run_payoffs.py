@@ -12,9 +12,8 @@ from galley.errors import GalleyError
 from galley.kitchen.layout_file import find_layout
 from galley.learning.forwards import Machine
 from galley.learning.graph import PayoffTable
-from galley.learning.payoffs import games_with
+from galley.learning.payoffs import games_among
 from galley.learning.populations.milestones import CHECKPOINTS
-from galley.learning.rollout import derived_seed
 from galley.learning.run_folder import load_policy, run_asked
 from galley.workspace import Workspace
 
@@ -31,7 +30,7 @@ def run_payoffs(
     """The payoffs of up to 50 checkpoints of a finished run, uniform along it, also written to payoffs.npz.
 
     Every pair plays `games` games in each seat order. COLE's checkpoints are the strategies of its
-    generations, those of other methods the policy in the making; `tell` hears of rows done and all.
+    generations, those of other methods the policy in the making; `tell` hears of ticks done and all.
 
     Source: COLE paper, Sec. 7.3 and Fig. 10.
 
@@ -48,12 +47,8 @@ def run_payoffs(
     chosen = [names[place] for place in places]
     policies = [load_policy(run / "members" / f"{name}.pt", layout, machine.device) for name in chosen]
     table = PayoffTable(chosen)
-    for row, policy in enumerate(policies):
-        scores = games_with(layout, policy, policies[row:], games, derived_seed(seed, row), machine)
-        for column, (as_first, as_second) in enumerate(scores, row):
-            table.measure(row, column, as_first)
-            if column != row:
-                table.measure(column, row, as_second)
-        tell(row + 1, len(policies))
+    scores = games_among(layout, policies, games, seed, machine, tell)
+    for row, column in np.ndindex(len(policies), len(policies)):
+        table.measure(row, column, scores[row, column])
     table.save(run / "payoffs.npz")
     return table
