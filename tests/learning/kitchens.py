@@ -1,4 +1,4 @@
-"""Small kitchens for learning: a few ticks, a few cells."""
+"""Small kitchens for learning, a few ticks and a few cells, and policies for them."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import torch
 
 from galley.kitchen import Layout
 from galley.learning.forwards import Machine
+from galley.learning.policy import Policy
 from galley.learning.settings import PPOSettings
 
 CPU = Machine(torch.device("cpu"))
@@ -27,3 +28,21 @@ QUICK = PPOSettings(
     shaping_ticks=500,
 )  # fmt: skip
 """Eight kitchens of twelve ticks an update."""
+
+
+def policy(seed: int) -> Policy:
+    """Untrained weights of a seed, to play with."""
+    return Policy(SMALL, torch.Generator().manual_seed(seed)).requires_grad_(False)
+
+
+class Always(Policy):
+    """A policy that takes one action."""
+
+    def __init__(self, action: int) -> None:
+        super().__init__(SMALL)
+        self.action = action
+
+    def forward(self, seen: torch.Tensor, prepared: object = None) -> tuple[torch.Tensor, torch.Tensor]:
+        logits = torch.full((len(seen), 6), -50.0)
+        logits[:, self.action] = 50.0
+        return logits, torch.zeros(len(seen))

@@ -4,21 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import torch
 from numpy.typing import NDArray
 
 from galley.kitchen import KitchenBatch
 from galley.learning import payoffs
 from galley.learning.payoffs import games_among
-from galley.learning.policy import Policy
-from tests.learning.kitchens import CPU, SMALL
-
-
-def always(action: int) -> Policy:
-    policy = Policy(SMALL).requires_grad_(False)
-    torch.nn.init.zeros_(policy.logits.weight)
-    policy.logits.bias.copy_(torch.where(torch.arange(6) == action, 50.0, 0.0))
-    return policy
+from tests.learning.kitchens import CPU, SMALL, Always, policy
 
 
 def test_each_policy_sits_where_its_row_and_column_say(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -30,7 +21,7 @@ def test_each_policy_sits_where_its_row_and_column_say(monkeypatch: pytest.Monke
             return super().step(joint)
 
     monkeypatch.setattr(payoffs, "KitchenBatch", Watched)
-    scores = games_among(SMALL, [always(action) for action in (4, 1, 5)], 2, 1, CPU)
+    scores = games_among(SMALL, [Always(action) for action in (4, 1, 5)], 2, 1, CPU)
     assert scores.shape == (3, 3, 2)
     wanted = [[row, column] for row in (4, 1, 5) for column in (4, 1, 5) for _ in range(2)]
     assert len(steps) == SMALL.rules.horizon_ticks
@@ -38,7 +29,7 @@ def test_each_policy_sits_where_its_row_and_column_say(monkeypatch: pytest.Monke
 
 
 def test_games_among_policies_are_seeded() -> None:
-    policies = [Policy(SMALL, torch.Generator().manual_seed(one)).requires_grad_(False) for one in (1, 2)]
+    policies = [policy(1), policy(2)]
     heard: list[tuple[int, int]] = []
     first = games_among(SMALL, policies, 3, 7, CPU, lambda done, total: heard.append((done, total)))
     assert (first == games_among(SMALL, policies, 3, 7, CPU)).all()

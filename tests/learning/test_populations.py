@@ -26,7 +26,7 @@ from galley.learning.rollout import Pairing
 from galley.learning.run_folder import RunFolder
 from galley.learning.settings import PPOSettings
 from galley.learning.training import Training, run
-from tests.learning.kitchens import CPU, QUICK, SMALL
+from tests.learning.kitchens import CPU, QUICK, SMALL, policy
 
 COLE = ColeSettings(
     generations=4, updates=2, cap=3, permutations=50, games=1, tries=2, tries_from=2, share=0.3
@@ -38,13 +38,9 @@ METHODS: dict[str, Callable[[], Training]] = {
     "fcp": lambda: FCP(SMALL, QUICK, seeds=2, self_play_updates=2, updates=3, seed=1, machine=CPU),
     "mep": lambda: MEP(SMALL, QUICK, size=2, self_play_updates=2, updates=3, seed=1, machine=CPU),
     "cole-sv": lambda: Cole(SMALL, QUICK, COLE, 1, CPU),
-    "cole-sv of a pool": lambda: Cole(SMALL, QUICK, COLE, 1, CPU, {"one": policy_of(1), "two": policy_of(2)}),
+    "cole-sv of a pool": lambda: Cole(SMALL, QUICK, COLE, 1, CPU, {"one": policy(1), "two": policy(2)}),
     "cole-r": lambda: Cole(SMALL, QUICK, ColeSettings("reward", generations=4, updates=1, games=1), 1, CPU),
 }
-
-
-def policy_of(seed: int) -> Policy:
-    return Policy(SMALL, torch.Generator().manual_seed(seed)).requires_grad_(False)
 
 
 def folder_at(path: Path) -> RunFolder:

@@ -10,26 +10,8 @@ from galley.errors import GalleyError
 from galley.kitchen import Encoder, Kitchen
 from galley.learning.forwards import Machine
 from galley.learning.payoffs import games_with
-from galley.learning.policy import Policy
 from galley.learning.rollout import Episodes, Pairing, choose, derived_seed
-from tests.learning.kitchens import CPU, SMALL
-
-
-def policy(seed: int) -> Policy:
-    return Policy(SMALL, torch.Generator().manual_seed(seed)).requires_grad_(False)
-
-
-class Always(Policy):
-    """A policy that takes one action."""
-
-    def __init__(self, action: int) -> None:
-        super().__init__(SMALL)
-        self.action = action
-
-    def forward(self, seen: torch.Tensor, prepared: object = None) -> tuple[torch.Tensor, torch.Tensor]:
-        logits = torch.full((len(seen), 6), -50.0)
-        logits[:, self.action] = 50.0
-        return logits, torch.zeros(len(seen))
+from tests.learning.kitchens import CPU, SMALL, Always, policy
 
 
 def test_what_is_recorded_is_what_the_rules_make_of_the_actions() -> None:
