@@ -65,9 +65,11 @@ def export(
         content = filled(grid_onnx(weights, Encoder(layout, ENCODING).shape))
         (folder / f"{layout.name}.onnx").write_bytes(content)
         facts[layout.name] = {"asked": one, **_made(run), "commit": one.pop("commit", ""), "scores": {}}
-        facts[layout.name]["ticks"] += sum(_made(Path(made))["ticks"] for made in one["pool"])
-        facts[layout.name]["seconds"] += sum(_made(Path(made))["seconds"] for made in one["pool"])
-        facts[layout.name]["pool"] = [run_asked(Path(made)) for made in one["pool"]]
+        pool = [Path(path) for path in one["pool"]]
+        facts[layout.name]["pool"] = [run_asked(path) for path in pool]
+        for made in map(_made, pool):
+            facts[layout.name]["ticks"] += made["ticks"]
+            facts[layout.name]["seconds"] += made["seconds"]
     (folder / "agent.yaml").write_text(_description(name, list(facts), unstuck_after_ticks), "utf-8")
     bundle = load_bundle(folder, folder.as_posix())
     for layout in layouts:
