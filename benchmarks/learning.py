@@ -29,11 +29,11 @@ import torch  # noqa: E402
 
 from galley.kitchen.layout_file import load_layout  # noqa: E402
 from galley.learning.learner import Learner, kitchens_of  # noqa: E402
-from galley.learning.memory import keep_freed_memory  # noqa: E402
 from galley.learning.methods import Asked, cole_of, machine_of, settings_of  # noqa: E402
 from galley.learning.payoffs import games_with  # noqa: E402
 from galley.learning.policy import Policy  # noqa: E402
 from galley.learning.ppo import update  # noqa: E402
+from galley.learning.process import prepare_process  # noqa: E402
 from galley.learning.rollout import Episodes, Pairing  # noqa: E402
 
 LAYOUT = "counter_circuit"
@@ -67,8 +67,7 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=3)
     args = parser.parse_args()
 
-    torch.set_num_threads(1)
-    keep_freed_memory()
+    prepare_process()
     layout = load_layout(ROOT / "layouts" / f"{LAYOUT}.yaml")
     asked = Asked("cole-sv", LAYOUT, threads=args.threads, device=args.device, bf16=args.bf16)
     settings, cole, machine = settings_of(asked)[0], cole_of(asked), machine_of(asked)

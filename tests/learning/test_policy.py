@@ -59,6 +59,22 @@ def test_sparse_and_dense_agree_in_results_and_gradients(layout: Layout) -> None
         torch.testing.assert_close(sparse, other, rtol=1e-3, atol=1e-4)
 
 
+@pytest.mark.parametrize("layout", LAYOUTS, ids=lambda layout: layout.name)
+def test_convolutions_are_products_with_a_matrix(layout: Layout) -> None:
+    policy = Policy(layout, torch.Generator().manual_seed(1))
+    for layer in (policy.first, policy.second, policy.third):
+        torch.nn.init.normal_(layer.bias)
+    seen = observations(layout)
+    gradients = []
+    for found in (policy(seen, policy.products()), dense(policy, seen)):
+        policy.zero_grad()
+        (found[0].square().sum() + found[1].square().sum()).backward()
+        gradients.append([parameter.grad.clone() for parameter in policy.parameters()])
+    torch.testing.assert_close(policy(seen, policy.products()), dense(policy, seen), rtol=1e-4, atol=1e-5)
+    for one, other in zip(*gradients, strict=True):
+        torch.testing.assert_close(one, other, rtol=1e-3, atol=1e-4)
+
+
 def test_the_sparse_convolution_reads_any_difference_from_the_map() -> None:
     policy = Policy(SMALL, torch.Generator().manual_seed(1))
     seen = torch.randint(0, 4, (5, *policy.map.shape), dtype=torch.uint8)

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-import platform
 from collections.abc import Callable, Sequence
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
 
@@ -20,6 +18,7 @@ from galley.kitchen import Encoder, Layout
 from galley.kitchen.layout_file import find_layout
 from galley.learning.export import grid_onnx
 from galley.learning.export_filled import filled
+from galley.learning.origin import ORIGIN, origin
 from galley.learning.policy import ENCODING
 from galley.learning.run_folder import load_tensors, run_asked
 from galley.learning.training_card import training_card
@@ -64,7 +63,8 @@ def export(
         weights = {key: tensor.numpy() for key, tensor in load_tensors(run / "members" / "best.pt").items()}
         content = filled(grid_onnx(weights, Encoder(layout, ENCODING).shape))
         (folder / f"{layout.name}.onnx").write_bytes(content)
-        facts[layout.name] = {"asked": one, **_made(run), "commit": one.pop("commit", ""), "scores": {}}
+        begun = origin("cpu") | {key: str(one.pop(key)) for key in ORIGIN if key in one}
+        facts[layout.name] = {"asked": one, **_made(run), **begun, "scores": {}}
         pool = [Path(path) for path in one["pool"]]
         facts[layout.name]["pool"] = [run_asked(path) for path in pool]
         for made in map(_made, pool):
@@ -80,15 +80,12 @@ def export(
 
 
 def _made(run: Path) -> dict[str, Any]:
-    """How far the run went, how long it took and where."""
+    """How far the run went and how long it took."""
     with (run / "log.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     return {
         "ticks": max(int(row["ticks"]) for row in rows),
         "seconds": float(rows[-1]["seconds"]),
-        "processor": _processor(),
-        "torch": version("torch"),
-        "galley": version("galley"),
     }
 
 
@@ -128,12 +125,3 @@ def _description(name: str, layouts: Sequence[str], unstuck: int | None) -> str:
         f"format: 1\nname: {name}\nkind: network\nencoding: {ENCODING}\nsampling: sample\n"
         f"unstuck_after_ticks: {'none' if unstuck is None else unstuck}\nlayouts:\n{files}\n"
     )
-
-
-def _processor() -> str:
-    try:
-        lines = Path("/proc/cpuinfo").read_text("utf-8").splitlines()
-    except OSError:
-        return platform.processor() or platform.machine()
-    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return names[0] if names else platform.machine()

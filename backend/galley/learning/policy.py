@@ -12,6 +12,7 @@ from torch.nn import functional
 
 from galley.kitchen import ACTIONS, Encoder, Layout
 from galley.learning import sparse_kernel as kernels
+from galley.learning.dense_kernel import Product, product
 
 ENCODING = "grid"
 FILTERS = 25
@@ -20,8 +21,11 @@ SLOPE = 0.2
 _FIRST_KERNEL = 5
 _NEXT_KERNEL = 3
 
-Prepared = tuple[NDArray[np.float32], NDArray[np.float32]]
+Sparse = tuple[NDArray[np.float32], NDArray[np.float32]]
 """Filters of the first convolution as the kernels want them, and the convolution of the map."""
+
+Prepared = Sparse | list[Product]
+"""What is made of the weights on a CPU; the convolutions as matrices on a GPU."""
 
 
 class _SparseConvolution(torch.autograd.Function):
@@ -63,7 +67,7 @@ class _SparseConvolution(torch.autograd.Function):
         return None, None, whole, torch.from_numpy(bias), None, None
 
 
-def _prepared(map_: torch.Tensor, layer: nn.Conv2d) -> Prepared:
+def _prepared(map_: torch.Tensor, layer: nn.Conv2d) -> Sparse:
     """The layer's filters as the kernels want them, and the convolution of the map."""
     channels, height, width = map_.shape
     size = layer.weight.shape[2]
@@ -81,7 +85,8 @@ class Policy(nn.Module):
     """A policy and a value for observations `grid` uint8 [B, 26, H, W] of one layout.
 
     Convolutions 5x5 and 3x3 "same" and 3x3 "valid" with 25 filters, dense layers of 64, leaky ReLU 0.2; the
-    heads share them. On a CPU the first convolution makes use of sparse observations, to the same result.
+    heads share them. On a CPU the first convolution makes use of sparse observations, on a GPU all three are
+    matrices, to the same result.
 
     Source: COLE paper, App. C; Carroll et al. 2019 (arXiv:1910.05789), App. C, for kernels and slope.
     """
@@ -115,24 +120,26 @@ class Policy(nn.Module):
         self, seen: torch.Tensor, prepared: Prepared | None = None
     ) -> tuple[torch.Tensor, torch.Tensor]:
         """Logits float32 [B, 6] and values float32 [B] of observations uint8 [B, 26, H, W]."""
-        if seen.device.type == "cpu":
-            flow = _SparseConvolution.apply(
-                seen,
-                self.map,
-                self.first.weight,
-                self.first.bias,
-                *(prepared or _prepared(self.map, self.first)),
-            )
+        ready = prepared or self.prepared()
+        if isinstance(ready, tuple):
+            flow = _SparseConvolution.apply(seen, self.map, self.first.weight, self.first.bias, *ready)
+            flow = functional.leaky_relu(self.second(flow), SLOPE, inplace=True)
+            flow = functional.leaky_relu(self.third(flow), SLOPE, inplace=True).flatten(1)
         else:
-            flow = functional.leaky_relu(
-                self.first(seen.float().contiguous(memory_format=torch.channels_last)), SLOPE
-            )
-        flow = functional.leaky_relu(self.second(flow), SLOPE, inplace=True)
-        flow = functional.leaky_relu(self.third(flow), SLOPE, inplace=True).flatten(1)
+            flow = seen.flatten(1).float()
+            for weight, bias in ready:
+                flow = functional.leaky_relu(functional.linear(flow, weight, bias), SLOPE, inplace=True)
         for layer in self.dense:
             flow = functional.leaky_relu(layer(flow), SLOPE, inplace=True)
         return self.logits(flow).float(), self.value(flow).float().squeeze(1)
 
-    def prepared(self) -> Prepared | None:
-        """What `forward` on a CPU makes of the weights, for many calls between which they do not change."""
-        return _prepared(self.map, self.first) if self.map.device.type == "cpu" else None
+    def prepared(self) -> Prepared:
+        """What `forward` makes of the weights, for many calls between which they do not change."""
+        if self.map.device.type == "cpu":
+            return _prepared(self.map, self.first)
+        return self.products()
+
+    def products(self) -> list[Product]:
+        """The three convolutions as matrices."""
+        height, width = self.map.shape[1:]
+        return [product(layer, height, width) for layer in (self.first, self.second, self.third)]

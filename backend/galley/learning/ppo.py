@@ -42,14 +42,16 @@ def advantages(
     rewards = settings.reward_scale * (rollout.rewards + shaping * rollout.shaping)
     if bonus is not None:
         rewards = rewards + bonus
+    rewards, values = rewards.cpu(), rollout.values.cpu()  # many small steps, which a GPU is slow at
     found = torch.empty_like(rewards)
     following = torch.zeros_like(rewards[0])
     carried = torch.zeros_like(rewards[0])
     for tick in range(len(rewards) - 1, -1, -1):
-        surprise = rewards[tick] + settings.gamma * following - rollout.values[tick]
+        surprise = rewards[tick] + settings.gamma * following - values[tick]
         carried = surprise + settings.gamma * settings.lambda_ * carried
         found[tick] = carried
-        following = rollout.values[tick]
+        following = values[tick]
+    found = found.to(rollout.values.device)
     return found, found + rollout.values
 
 
@@ -87,7 +89,7 @@ def update(
         most = len(rows) if device.type == "cuda" else LARGEST_CHUNK
         for chunk, advantage in zip(rows.split(most), gained.split(most), strict=True):
             with torch.autocast(device.type, torch.bfloat16, enabled=machine.bf16):
-                logits, values = replica(seen[chunk.cpu()].to(device))
+                logits, values = replica(seen[chunk])
             log_policy = functional.log_softmax(logits, dim=1)
             now = log_policy.gather(1, actions[chunk].unsqueeze(1)).squeeze(1)
             entropy = -(log_policy.exp() * log_policy).sum(dim=1)
@@ -106,9 +108,8 @@ def update(
     figures = torch.zeros(5, device=device)
     with Replicas(policy, machine) as replicas:
         for _ in range(settings.epochs):
-            order = torch.randperm(len(actions), generator=generator)
-            for minibatch in order.chunk(settings.minibatches):
-                rows = minibatch.to(device)
+            order = torch.randperm(len(actions), generator=generator).to(device)
+            for rows in order.chunk(settings.minibatches):
                 gained = found[rows]
                 gained = (gained - gained.mean()) / (gained.std() + 1e-8)
                 optimiser.zero_grad(set_to_none=True)

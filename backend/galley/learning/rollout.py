@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,16 +46,33 @@ class Rollout:
 class _Table:
     """Who plays where: the learner's seat in each kitchen, `own` kitchens where it sits on both.
 
-    `mine` uint8 [kitchens + own, 26, H, W] is what the learner sees, first in its seats, then in the others
-    of `own`; `across` [kitchens, ...] what the other seats see, of which each partner has a slice.
+    `sides` uint8 [2, kitchens, 26, H, W] is what the learner's seats and the others see, on the host. All
+    other tensors are on the device: `mine` [kitchens + own, ...] what the learner sees, first in its seats,
+    then in the others of `own`; `across` [kitchens, ...] what the other seats see, of which each partner has
+    a slice; `draws` float32 [2, kitchens] for the learner and for the partner of each kitchen.
     """
 
     learner: Ready
     seats: NDArray[np.int64]
-    own: NDArray[np.int64]
+    own: torch.Tensor
+    sides: torch.Tensor
     mine: torch.Tensor
     across: torch.Tensor
+    draws: torch.Tensor
     partners: list[tuple[Ready, slice]]
+
+
+@dataclass(frozen=True)
+class _Answers:
+    """Of a tick, on the device: `logits` [kitchens + own, 6], `values` and `actions` of the learner's rows.
+
+    `joint` int64 [kitchens, 2] is what the learner chose and what the other seat answered.
+    """
+
+    logits: torch.Tensor
+    values: torch.Tensor
+    actions: torch.Tensor
+    joint: torch.Tensor
 
 
 class Episodes:
@@ -87,24 +104,21 @@ class Episodes:
         """
         table = self._table(learner, pairings)
         size = self.batch.size
+        own = table.own.cpu().numpy()
         rows = len(table.mine) if both else size
-        kitchens = np.concatenate([np.arange(size), table.own])[:rows]
-        draws = self._draws(seed)
-        seen = torch.empty((self.horizon, rows, *self.encoder.shape), dtype=torch.uint8)
+        kitchens = np.concatenate([np.arange(size), own])[:rows]
+        seen = torch.empty((self.horizon, rows, *self.encoder.shape), dtype=torch.uint8, device=self.device)
         actions = torch.empty(self.horizon, rows, dtype=torch.int64, device=self.device)
         logits = torch.empty(self.horizon, rows, len(ACTIONS), device=self.device)
         values = torch.empty(self.horizon, rows, device=self.device)
         rewards = np.empty((self.horizon, size), dtype=np.float32)
         shaping = np.empty((self.horizon, size), dtype=np.float32)
         self.batch.reset()
-        for tick in range(self.horizon):
-            here, worth, there = self._ask(table)
+        for tick, answers in enumerate(self._ticks(table, seed)):
             seen[tick] = table.mine[:rows]
-            logits[tick], values[tick] = here[:rows], worth[:rows]
-            chosen = choose(here[:size], draws[tick, 0])
-            answered = choose(there, draws[tick, 1])
-            actions[tick] = torch.cat([chosen, answered[table.own]])[:rows]
-            rewards[tick] = self._step(table.seats, chosen, answered)
+            logits[tick], values[tick] = answers.logits[:rows], answers.values[:rows]
+            actions[tick] = answers.actions[:rows]
+            rewards[tick] = self._step(table.seats, answers)
             shaping[tick] = self.batch.shaping().sum(axis=1)
         taken = torch.log_softmax(logits, dim=2).gather(2, actions.unsqueeze(2)).squeeze(2)
         return Rollout(
@@ -114,7 +128,7 @@ class Episodes:
             values=values,
             rewards=torch.from_numpy(rewards[:, kitchens]).to(self.device),
             shaping=torch.from_numpy(shaping[:, kitchens]).to(self.device),
-            seats=np.concatenate([table.seats, 1 - table.seats[table.own]])[:rows],
+            seats=np.concatenate([table.seats, 1 - table.seats[own]])[:rows],
             kitchens=kitchens,
             scores=rewards.sum(axis=0).astype(np.int64),
         )
@@ -123,12 +137,9 @@ class Episodes:
     def scores(self, policy: Policy, pairings: Sequence[Pairing], seed: int) -> NDArray[np.int64]:
         """int64 [kitchens]: the scores of one episode of every kitchen, dealt and drawn as in `play`."""
         table = self._table(policy, pairings)
-        draws = self._draws(seed)
         self.batch.reset()
-        for tick in range(self.horizon):
-            here, _, there = self._ask(table)
-            chosen = choose(here[: self.batch.size], draws[tick, 0])
-            self._step(table.seats, chosen, choose(there, draws[tick, 1]))
+        for answers in self._ticks(table, seed):
+            self._step(table.seats, answers)
         return self.batch.scores.astype(np.int64)
 
     def _table(self, learner: Policy, pairings: Sequence[Pairing]) -> _Table:
@@ -141,22 +152,41 @@ class Episodes:
         if sum(pairing.kitchens for pairing in pairings) != size:
             raise ValueError(f"pairings must share out {size} kitchens")
         own = np.flatnonzero(np.concatenate([np.full(one.kitchens, one.partner is None) for one in pairings]))
-        mine = torch.empty((size + len(own), *self.encoder.shape), dtype=torch.uint8)
-        across = torch.empty((size, *self.encoder.shape), dtype=torch.uint8)
+        shape, device = self.encoder.shape, self.device
         starts = np.cumsum([0, *(pairing.kitchens for pairing in pairings)])
-        partners = [
-            (Ready(pairing.partner), slice(start, start + pairing.kitchens))
-            for pairing, start in zip(pairings, starts.tolist(), strict=False)
-            if pairing.partner is not None
-        ]
-        return _Table(Ready(learner), alternating(pairings), own, mine, across, partners)
+        return _Table(
+            learner=Ready(learner),
+            seats=alternating(pairings),
+            own=torch.from_numpy(own).to(device),
+            sides=torch.empty((2, size, *shape), dtype=torch.uint8, pin_memory=device.type == "cuda"),
+            mine=torch.zeros((size + len(own), *shape), dtype=torch.uint8, device=device),
+            across=torch.zeros((size, *shape), dtype=torch.uint8, device=device),
+            draws=torch.zeros((2, size), device=device),
+            partners=[
+                (Ready(pairing.partner), slice(start, start + pairing.kitchens))
+                for pairing, start in zip(pairings, starts.tolist(), strict=False)
+                if pairing.partner is not None
+            ],
+        )
 
-    def _ask(self, table: _Table) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-        """The learner's logits [kitchens + own, 6] and values, and the partners' logits [kitchens, 6]."""
+    def _ticks(self, table: _Table, seed: int) -> Iterator[_Answers]:
+        """The answers of all ticks from now on; each is good until the next is asked for."""
         size = self.batch.size
-        self.encoder.seat(self.batch.states, table.seats, table.mine[:size].numpy())
-        self.encoder.seat(self.batch.states, 1 - table.seats, table.across.numpy())
-        table.mine[size:] = table.across[table.own]
+        generator = torch.Generator(self.device).manual_seed(seed)
+        draws = torch.rand((self.horizon, *table.draws.shape), generator=generator, device=self.device)
+        ask = self.forwards.again(lambda: self._ask(table))
+        for tick in range(self.horizon):
+            for side, seats in enumerate((table.seats, 1 - table.seats)):
+                self.encoder.seat(self.batch.states, seats, table.sides[side].numpy())
+            table.mine[:size].copy_(table.sides[0], non_blocking=True)
+            table.across.copy_(table.sides[1], non_blocking=True)
+            table.draws.copy_(draws[tick])
+            yield ask()
+
+    def _ask(self, table: _Table) -> _Answers:
+        """What everybody answers to what is on the table; only tensors of the device take part."""
+        size = self.batch.size
+        table.mine[size:] = table.across.index_select(0, table.own)
         parts = table.mine.tensor_split(1 if table.partners else self.forwards.threads)
         found = self.forwards(
             [
@@ -165,24 +195,20 @@ class Episodes:
             ]
         )
         here = torch.cat([logits for logits, _ in found[: len(parts)]])
-        worth = torch.cat([values for _, values in found[: len(parts)]])
-        there = torch.empty(size, len(ACTIONS), device=self.device)
-        there[table.own] = here[size:]
+        there = torch.zeros(size, len(ACTIONS), device=self.device).index_copy_(0, table.own, here[size:])
         for (_, part), (logits, _) in zip(table.partners, found[len(parts) :], strict=True):
             there[part] = logits
-        return here, worth, there
+        chosen, answered = choose(here[:size], table.draws[0]), choose(there, table.draws[1])
+        return _Answers(
+            logits=here,
+            values=torch.cat([values for _, values in found[: len(parts)]]),
+            actions=torch.cat([chosen, answered.index_select(0, table.own)]),
+            joint=torch.stack([chosen, answered], dim=1),
+        )
 
-    def _draws(self, seed: int) -> torch.Tensor:
-        """float32 [T, 2, kitchens] in [0, 1): for the learner and for the partner of each kitchen."""
-        generator = torch.Generator(self.device).manual_seed(seed)
-        shape = (self.horizon, 2, self.batch.size)
-        return torch.rand(shape, generator=generator, device=self.device)
-
-    def _step(
-        self, seats: NDArray[np.int64], chosen: torch.Tensor, answered: torch.Tensor
-    ) -> NDArray[np.int32]:
-        """int32 [kitchens]: the rewards of a tick in which the learner chose and the partners answered."""
-        joint = torch.stack([chosen, answered], dim=1).cpu().numpy()
+    def _step(self, seats: NDArray[np.int64], answers: _Answers) -> NDArray[np.int32]:
+        """int32 [kitchens]: the rewards of a tick in which everybody does what was answered."""
+        joint = answers.joint.cpu().numpy()
         first = seats[:, np.newaxis] == 0
         return self.batch.step(np.where(first, joint, joint[:, ::-1]))
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import subprocess
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -14,6 +13,7 @@ from torch.utils.tensorboard import SummaryWriter
 
 from galley.errors import GalleyError
 from galley.kitchen import Layout
+from galley.learning.origin import ORIGIN, origin
 from galley.learning.policy import Policy
 from galley.learning.whole_file import whole_file
 
@@ -57,7 +57,7 @@ class RunFolder:
             self._compare(described, asked)
         else:
             (path / "members").mkdir(parents=True, exist_ok=True)
-            told = {**asked, "commit": _commit()}
+            told = {**asked, **origin(str(asked.get("device", "cpu")))}
             _write(described, (json.dumps(told, indent=2, sort_keys=True) + "\n").encode())
 
     def load(self) -> dict[str, Any] | None:
@@ -117,7 +117,7 @@ class RunFolder:
         except ValueError as error:
             raise GalleyError(f"{described}: is no JSON ({error}); remove the folder to start anew") from None
         wanted = json.loads(json.dumps(asked))
-        names = {*known, *wanted} - {"commit"}  # of the source that began the run
+        names = {*known, *wanted} - {*ORIGIN}
         differing = sorted(key for key in names if known.get(key) != wanted.get(key))
         if differing:
             told = ", ".join(f"{key} {known.get(key)!r} (asked: {wanted.get(key)!r})" for key in differing)
@@ -185,15 +185,3 @@ def save_tensors(path: Path, content: Mapping[str, Any]) -> None:
 def _write(path: Path, content: bytes) -> None:
     with whole_file(path) as file:
         file.write(content)
-
-
-def _commit() -> str:
-    """The commit of this source, or nothing outside a checkout."""
-    try:
-        found = subprocess.run(
-            ["git", "rev-parse", "--short=12", "HEAD"],  # noqa: S607
-            cwd=Path(__file__).parent, capture_output=True, text=True, check=True,
-        )  # fmt: skip
-    except (OSError, subprocess.CalledProcessError):
-        return ""
-    return found.stdout.strip()

@@ -8,14 +8,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import torch
 from tqdm import tqdm
 
 from galley.errors import GalleyError
 from galley.kitchen import Layout
-from galley.learning.memory import keep_freed_memory
 from galley.learning.methods import Asked, described, machine_of, make
 from galley.learning.policy import Policy
+from galley.learning.process import prepare_process
 from galley.learning.run_folder import RunFolder
 from galley.learning.training import run
 
@@ -26,8 +25,7 @@ def train_run(asked: Asked, layout: Layout, path: Path) -> Policy:
     Raises:
         GalleyError: something asked for cannot be, `path` holds another run, or another process trains there.
     """
-    torch.set_num_threads(1)
-    keep_freed_memory()
+    prepare_process()
     training = make(asked, layout)
     folder = RunFolder(path, described(asked))
 

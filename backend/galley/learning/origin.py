@@ -1,0 +1,56 @@
+"""What a run is made with: source, libraries and processor."""
+
+from __future__ import annotations
+
+import platform
+import subprocess
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Final
+
+import torch
+
+ORIGIN: Final = ("commit", "galley", "torch", "processor")
+
+
+def origin(device: str) -> dict[str, str]:
+    """The values of `ORIGIN` for a run on device cpu or cuda; "" for what cannot be known."""
+    processor = _processor()
+    if device == "cuda":
+        processor = f"{torch.cuda.get_device_name()} and {processor}"
+    return {
+        "commit": _commit(),
+        "galley": _version("galley"),
+        "torch": torch.__version__,
+        "processor": f"{torch.cuda.get_device_name()} and {_processor()}"
+        if device == "cuda"
+        else _processor(),
+    }
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return ""
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text("utf-8").splitlines()
+    except OSError:
+        return platform.processor() or platform.machine()
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.machine()
+
+
+def _commit() -> str:
+    """The commit of this source, or nothing outside a checkout."""
+    try:
+        found = subprocess.run(
+            ["git", "rev-parse", "--short=12", "HEAD"],  # noqa: S607
+            cwd=Path(__file__).parent, capture_output=True, text=True, check=True,
+        )  # fmt: skip
+    except (OSError, subprocess.CalledProcessError):
+        return ""
+    return found.stdout.strip()
