@@ -28,7 +28,7 @@ def rollout_of(rewards: list[float], values: list[float]) -> Rollout:
         log_probabilities=torch.zeros_like(column),
         values=torch.tensor(values).unsqueeze(1),
         rewards=column,
-        shaping=torch.ones_like(column),
+        shaping=torch.stack([torch.ones_like(column), torch.full_like(column, 4.0)]),
         seats=np.zeros(1, dtype=np.int64),
         kitchens=np.zeros(1, dtype=np.int64),
         scores=np.zeros(1, dtype=np.int64),
@@ -36,10 +36,10 @@ def rollout_of(rewards: list[float], values: list[float]) -> Rollout:
 
 
 def test_advantages_are_the_sum_of_discounted_surprises() -> None:
-    settings = PPOSettings(gamma=0.9, lambda_=0.7, reward_scale=0.5)
+    settings = PPOSettings(gamma=0.9, lambda_=0.7, reward_scale=0.5, partner_shaping=0.5)
     rewards, values = [0.0, 20.0, 0.0, 20.0], [1.0, 2.0, -1.0, 0.5]
     found, returns = advantages(rollout_of(rewards, values), settings, shaping=0.25)
-    paid = [0.5 * (reward + 0.25) for reward in rewards]
+    paid = [0.5 * (reward + 0.25 * (1 + 0.5 * 4)) for reward in rewards]
     following = [*values[1:], 0.0]
     surprises = [
         reward + 0.9 * later - value for reward, later, value in zip(paid, following, values, strict=True)

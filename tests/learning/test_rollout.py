@@ -29,6 +29,9 @@ def test_what_is_recorded_is_what_the_rules_make_of_the_actions() -> None:
                 assert np.array_equal(seen, rollout.seen[tick, index].numpy())
             actions = {int(rollout.seats[one]): int(rollout.actions[tick, one]) for one in (row, again)}
             assert kitchen.step(actions[0], actions[1]) == rollout.rewards[tick, row]
+    assert torch.equal(rollout.shaping[0, :, :2], rollout.shaping[1, :, 6:])  # own and other change places
+    assert torch.equal(rollout.shaping[1, :, :2], rollout.shaping[0, :, 6:])
+    assert rollout.shaping.sum() > 0
 
 
 def test_log_probabilities_and_values_are_the_learners() -> None:

@@ -46,6 +46,11 @@ QUICK: Final[dict[str, Any]] = {
 }
 """Constants with which a policy needs a fifth of the ticks, at a quarter of the passes: larger steps."""
 
+RESPONSE: Final[dict[str, Any]] = {"lambda_": 0.9, "partner_shaping": 0.0}
+"""Constants of a best response, ours: a cook beside competent partners learns little from what they earn."""
+RESPONSE_SHAPING: Final = 0.9
+"""Share of a best response's ticks over which its extra reward falls to 0, ours; see docs/learning.md."""
+
 
 @dataclass(frozen=True)
 class Asked:
@@ -87,12 +92,13 @@ def make(asked: Asked, layout: Layout) -> Training:
         return FCP(
             layout, settings, seeds=asked.population or FCP_SEEDS, self_play_updates=updates,
             updates=round(FCP_RESPONSE * updates), seed=seed, machine=machine,
-            pool=pooled(asked.pool, layout, machine.device),
+            response=response_of(asked, FCP_RESPONSE), pool=pooled(asked.pool, layout, machine.device),
         )  # fmt: skip
     if asked.method == "mep":
         return MEP(
             layout, settings, size=asked.population or MEP_SIZE, self_play_updates=updates,
             updates=round(MEP_RESPONSE * updates), seed=seed, machine=machine,
+            response=response_of(asked, MEP_RESPONSE),
         )  # fmt: skip
     first = pooled(asked.pool, layout, machine.device)
     return Cole(layout, settings, cole_of(asked), seed, machine, first)
@@ -136,6 +142,15 @@ def settings_of(asked: Asked) -> tuple[PPOSettings, float]:
     if "shaping_ticks" not in dict(asked.changes):
         settings = settings.changed(shaping_ticks=min(settings.shaping_ticks, total / 2))
     return settings, total
+
+
+def response_of(asked: Asked, share: float) -> PPOSettings:
+    """The constants of the best response of FCP and MEP, who learns from `share` times a member's ticks."""
+    settings, total = settings_of(asked)
+    changes = {**RESPONSE, "shaping_ticks": RESPONSE_SHAPING * share * total}
+    return settings.changed(
+        **{key: value for key, value in changes.items() if key not in dict(asked.changes)}
+    )
 
 
 def cole_of(asked: Asked) -> ColeSettings:
@@ -225,6 +240,8 @@ def described(asked: Asked) -> dict[str, Any]:
     }
     if asked.method.startswith("cole"):
         told["cole"] = asdict(cole_of(asked))
+    if asked.method in ("fcp", "mep"):
+        told["response"] = asdict(response_of(asked, FCP_RESPONSE if asked.method == "fcp" else MEP_RESPONSE))
     return told
 
 

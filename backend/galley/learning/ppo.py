@@ -39,7 +39,9 @@ def advantages(
 
     Source: Schulman et al. 2016 (arXiv:1506.02438), eq. 16; an episode is worth nothing after its horizon.
     """
-    rewards = settings.reward_scale * (rollout.rewards + shaping * rollout.shaping)
+    own, others = rollout.shaping
+    extra = own + settings.partner_shaping * others
+    rewards = settings.reward_scale * (rollout.rewards + shaping * extra)
     if bonus is not None:
         rewards = rewards + bonus
     rewards, values = rewards.cpu(), rollout.values.cpu()  # many small steps, which a GPU is slow at

@@ -27,8 +27,9 @@ class Pairing:
 class Rollout:
     """What the learner saw, did and got: T ticks in N rows, a row being one seat of one kitchen.
 
-    `seen` uint8 [T, N, 26, H, W], `actions` int64, `log_probabilities`, `values`, `rewards` (sparse) and
-    `shaping` float32, all [T, N]; `seats` int64 [N]; `scores` int64 [kitchens]; `kitchens` int64 [N].
+    `seen` uint8 [T, N, 26, H, W], `actions` int64, `log_probabilities`, `values` and `rewards` (sparse)
+    float32, all [T, N]; `shaping` float32 [2, T, N] for the row's own deeds and for those of the other seat;
+    `seats` int64 [N]; `scores` int64 [kitchens]; `kitchens` int64 [N].
     """
 
     seen: torch.Tensor
@@ -107,19 +108,20 @@ class Episodes:
         own = table.own.cpu().numpy()
         rows = len(table.mine) if both else size
         kitchens = np.concatenate([np.arange(size), own])[:rows]
+        seats = np.concatenate([table.seats, 1 - table.seats[own]])[:rows]
         seen = torch.empty((self.horizon, rows, *self.encoder.shape), dtype=torch.uint8, device=self.device)
         actions = torch.empty(self.horizon, rows, dtype=torch.int64, device=self.device)
         logits = torch.empty(self.horizon, rows, len(ACTIONS), device=self.device)
         values = torch.empty(self.horizon, rows, device=self.device)
         rewards = np.empty((self.horizon, size), dtype=np.float32)
-        shaping = np.empty((self.horizon, size), dtype=np.float32)
+        shaping = np.empty((self.horizon, size, 2), dtype=np.float32)
         self.batch.reset()
         for tick, answers in enumerate(self._ticks(table, seed)):
             seen[tick] = table.mine[:rows]
             logits[tick], values[tick] = answers.logits[:rows], answers.values[:rows]
             actions[tick] = answers.actions[:rows]
             rewards[tick] = self._step(table.seats, answers)
-            shaping[tick] = self.batch.shaping().sum(axis=1)
+            shaping[tick] = self.batch.shaping()
         taken = torch.log_softmax(logits, dim=2).gather(2, actions.unsqueeze(2)).squeeze(2)
         return Rollout(
             seen=seen,
@@ -127,8 +129,10 @@ class Episodes:
             log_probabilities=taken,
             values=values,
             rewards=torch.from_numpy(rewards[:, kitchens]).to(self.device),
-            shaping=torch.from_numpy(shaping[:, kitchens]).to(self.device),
-            seats=np.concatenate([table.seats, 1 - table.seats[own]])[:rows],
+            shaping=torch.from_numpy(
+                np.stack([shaping[:, kitchens, seats], shaping[:, kitchens, 1 - seats]])
+            ).to(self.device),
+            seats=seats,
             kitchens=kitchens,
             scores=rewards.sum(axis=0).astype(np.int64),
         )

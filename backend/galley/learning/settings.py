@@ -44,6 +44,9 @@ class PPOSettings:
     shaping_ticks: float = 2.5e6
     """Ticks over which the extra reward of `KitchenBatch.shaping` falls linearly to 0."""
 
+    partner_shaping: float = 1.0
+    """Weight of what the other seat does within the extra reward, 0 to 1."""
+
     def problems(self) -> list[str]:
         """What cannot be, each with its fix."""
         found = []
@@ -53,7 +56,7 @@ class PPOSettings:
         for name in ("ticks", "minibatches", "epochs"):
             if getattr(self, name) < 1:
                 found.append(f"{name} is {getattr(self, name)}; use a whole number of at least 1")
-        for name in ("gamma", "lambda_", "final_rate_share"):
+        for name in ("gamma", "lambda_", "final_rate_share", "partner_shaping"):
             if not 0 <= getattr(self, name) <= 1:
                 found.append(f"{name} is {getattr(self, name)}; use a number from 0 to 1")
         for name in ("clip", "value_coefficient", "entropy_start", "entropy_end", "shaping_ticks"):

@@ -89,6 +89,6 @@ def row_of(
         "update": learner.done,
         "score": float(rollout.scores.mean()),
         "stage": stage,
-        "shaping": float(rollout.shaping.sum(dim=0).mean()),
+        "shaping": float(rollout.shaping.sum(dim=(0, 1)).mean()),
         **dataclasses.asdict(figures),
     }

@@ -34,6 +34,7 @@ class FCP:
         updates: int,
         seed: int,
         machine: Machine,
+        response: PPOSettings | None = None,
         pool: Mapping[str, Policy] | None = None,
     ) -> None:
         self.pool = dict(pool or {})
@@ -43,7 +44,7 @@ class FCP:
             layout, settings, self_play_updates, derived_seed(seed, 40, number), machine
         )
         self.population: dict[str, Policy] = dict(self.pool)
-        self.response = BestResponse(layout, settings, updates, seed, machine, alpha=0.0)
+        self.response = BestResponse(layout, response or settings, updates, seed, machine, alpha=0.0)
         self.number = 0
         self.training: SelfPlay = self._make(0)
 

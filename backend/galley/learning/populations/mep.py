@@ -40,6 +40,7 @@ class MEP:
         updates: int,
         seed: int,
         machine: Machine,
+        response: PPOSettings | None = None,
     ) -> None:
         self.weight = weight * settings.reward_scale
         self.trainings = [
@@ -47,7 +48,7 @@ class MEP:
             for number in range(size)
         ]
         self.population: dict[str, Policy] = {}
-        self.response = BestResponse(layout, settings, updates, seed, machine, alpha=alpha)
+        self.response = BestResponse(layout, response or settings, updates, seed, machine, alpha=alpha)
         self.total = size * self_play_updates + updates
 
     @property
