@@ -52,6 +52,9 @@ def train(
             metavar="RUN", help="FCP, COLE: a finished run of sp for the first population, once each."
         ),
     ] = None,
+    response: Annotated[
+        float, typer.Option(metavar="X", help="FCP, MEP: ticks of the best response for one of a member.")
+    ] = 2.0,
     no_wpg: Annotated[
         bool, typer.Option("--no-wpg", help="COLE: leave the weighted PageRank out (ablation).")
     ] = False,
@@ -99,6 +102,7 @@ def train(
         generation_updates=generation_updates,
         population=population,
         pool=tuple(pool or ()),
+        response=response,
         changes=parsed_changes(set_ or ()),
         threads=threads or os.cpu_count() or 1,
         device=device,

@@ -28,10 +28,7 @@ METHODS: Final = ("sp", "pbt", "fcp", "mep", "cole-sv", "cole-r")
 RATIOS: Final = {"0:4": (0, 4), "1:3": (1, 3), "2:2": (2, 2), "3:1": (3, 1)}
 
 FCP_SEEDS: Final = 8
-FCP_RESPONSE: Final = 2.0
 MEP_SIZE: Final = 5
-MEP_RESPONSE: Final = 2.0
-"""The population's members learn as long as the layout's self-play run; the response twice as long. Ours."""
 
 QUICK: Final[dict[str, Any]] = {
     "ticks": 12_000,
@@ -68,6 +65,8 @@ class Asked:
     generation_updates: int | None = None
     population: int | None = None
     pool: tuple[str, ...] = ()
+    response: float = 2.0
+    """Ticks of the best response of FCP and MEP, as a multiple of a member's. Ours."""
     changes: tuple[tuple[str, float], ...] = ()
     threads: int = 1
     device: str = "cpu"
@@ -91,14 +90,14 @@ def make(asked: Asked, layout: Layout) -> Training:
     if asked.method == "fcp":
         return FCP(
             layout, settings, seeds=asked.population or FCP_SEEDS, self_play_updates=updates,
-            updates=round(FCP_RESPONSE * updates), seed=seed, machine=machine,
-            response=response_of(asked, FCP_RESPONSE), pool=pooled(asked.pool, layout, machine.device),
+            updates=round(asked.response * updates), seed=seed, machine=machine,
+            response=response_of(asked), pool=pooled(asked.pool, layout, machine.device),
         )  # fmt: skip
     if asked.method == "mep":
         return MEP(
             layout, settings, size=asked.population or MEP_SIZE, self_play_updates=updates,
-            updates=round(MEP_RESPONSE * updates), seed=seed, machine=machine,
-            response=response_of(asked, MEP_RESPONSE),
+            updates=round(asked.response * updates), seed=seed, machine=machine,
+            response=response_of(asked),
         )  # fmt: skip
     first = pooled(asked.pool, layout, machine.device)
     return Cole(layout, settings, cole_of(asked), seed, machine, first)
@@ -116,6 +115,8 @@ def settings_of(asked: Asked) -> tuple[PPOSettings, float]:
         raise GalleyError(f"scale is {asked.scale}; use a number above 0 and at most 10")
     if asked.pool and asked.method not in ("fcp", "cole-sv", "cole-r"):
         raise GalleyError(f"--pool gives FCP and COLE a population; method {asked.method} makes its own")
+    if not 0 < asked.response <= 100:
+        raise GalleyError(f"response is {asked.response}; use a number above 0 and at most 100")
     if asked.population is not None and not 1 < asked.population <= 64:
         raise GalleyError(f"population is {asked.population}; use 2 to 64")
     known = constants(asked.layout)
@@ -144,10 +145,10 @@ def settings_of(asked: Asked) -> tuple[PPOSettings, float]:
     return settings, total
 
 
-def response_of(asked: Asked, share: float) -> PPOSettings:
-    """The constants of the best response of FCP and MEP, who learns from `share` times a member's ticks."""
+def response_of(asked: Asked) -> PPOSettings:
+    """The constants of the best response of FCP and MEP."""
     settings, total = settings_of(asked)
-    changes = {**RESPONSE, "shaping_ticks": RESPONSE_SHAPING * share * total}
+    changes = {**RESPONSE, "shaping_ticks": RESPONSE_SHAPING * asked.response * total}
     return settings.changed(
         **{key: value for key, value in changes.items() if key not in dict(asked.changes)}
     )
@@ -241,7 +242,7 @@ def described(asked: Asked) -> dict[str, Any]:
     if asked.method.startswith("cole"):
         told["cole"] = asdict(cole_of(asked))
     if asked.method in ("fcp", "mep"):
-        told["response"] = asdict(response_of(asked, FCP_RESPONSE if asked.method == "fcp" else MEP_RESPONSE))
+        told["response_ppo"] = asdict(response_of(asked))
     return told
 
 

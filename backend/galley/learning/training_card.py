@@ -72,6 +72,8 @@ def command(asked: Mapping[str, Any]) -> str:
         if asked[option] is not None:
             words.append(f"--{option.replace('_', '-')} {asked[option]}")
     words += [f"--pool {run}" for run in asked["pool"]]
+    response = asked.get("response", Asked.response)
+    words += [f"--response {response:g}"] if response != Asked.response else []
     words += [f"--set {key}={value:g}" for key, value in _changes(asked).items()]
     words.append(f"--threads {asked['threads']}")
     words += [f"--device {asked['device']}"] if asked["device"] != "cpu" else []
