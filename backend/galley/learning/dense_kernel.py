@@ -1,4 +1,4 @@
-"""Convolutions as matrix products, for GPUs: kitchens are so small that one product beats many filters."""
+"""Convolutions as matrix products, for playing on GPUs: for the few rows of a tick one product is quicker."""
 
 from __future__ import annotations
 

@@ -85,8 +85,8 @@ class Policy(nn.Module):
     """A policy and a value for observations `grid` uint8 [B, 26, H, W] of one layout.
 
     Convolutions 5x5 and 3x3 "same" and 3x3 "valid" with 25 filters, dense layers of 64, leaky ReLU 0.2; the
-    heads share them. On a CPU the first convolution makes use of sparse observations, on a GPU all three are
-    matrices, to the same result.
+    heads share them. On a CPU the first convolution makes use of sparse observations, and weights that stay
+    as they are make all three matrices on a GPU, to the same result.
 
     Source: COLE paper, App. C; Carroll et al. 2019 (arXiv:1910.05789), App. C, for kernels and slope.
     """
@@ -120,18 +120,27 @@ class Policy(nn.Module):
         self, seen: torch.Tensor, prepared: Prepared | None = None
     ) -> tuple[torch.Tensor, torch.Tensor]:
         """Logits float32 [B, 6] and values float32 [B] of observations uint8 [B, 26, H, W]."""
-        ready = prepared or self.prepared()
-        if isinstance(ready, tuple):
-            flow = _SparseConvolution.apply(seen, self.map, self.first.weight, self.first.bias, *ready)
-            flow = functional.leaky_relu(self.second(flow), SLOPE, inplace=True)
-            flow = functional.leaky_relu(self.third(flow), SLOPE, inplace=True).flatten(1)
-        else:
+        if isinstance(prepared, list):
             flow = seen.flatten(1).float()
-            for weight, bias in ready:
+            for weight, bias in prepared:
                 flow = functional.leaky_relu(functional.linear(flow, weight, bias), SLOPE, inplace=True)
+        else:
+            flow = functional.leaky_relu(self.second(self._first(seen, prepared)), SLOPE, inplace=True)
+            flow = functional.leaky_relu(self.third(flow), SLOPE, inplace=True).flatten(1)
         for layer in self.dense:
             flow = functional.leaky_relu(layer(flow), SLOPE, inplace=True)
         return self.logits(flow).float(), self.value(flow).float().squeeze(1)
+
+    def _first(self, seen: torch.Tensor, prepared: Sparse | None) -> torch.Tensor:
+        """The first layer's output [B, 25, H, W]."""
+        if seen.device.type == "cpu":
+            ready = prepared or _prepared(self.map, self.first)
+            flow: torch.Tensor = _SparseConvolution.apply(
+                seen, self.map, self.first.weight, self.first.bias, *ready
+            )
+            return flow
+        seen = seen.float().contiguous(memory_format=torch.channels_last)
+        return functional.leaky_relu(self.first(seen), SLOPE)
 
     def prepared(self) -> Prepared:
         """What `forward` makes of the weights, for many calls between which they do not change."""
