@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -22,7 +23,7 @@ from galley.kitchen.layout_file import load_layout
 from galley.learning.bundling import export
 from galley.learning.graph import PayoffTable
 from galley.learning.learner import Learner
-from galley.learning.methods import Asked, described, make, parsed_changes, pooled
+from galley.learning.methods import Asked, described, make, parsed_changes, pooled, response_of
 from galley.learning.run_folder import RunFolder
 from galley.learning.run_payoffs import run_payoffs
 from galley.learning.training_card import command, paper_ticks
@@ -110,6 +111,16 @@ def test_published_constants_are_the_defaults(workspace: Path) -> None:
     assert described(Asked("sp", "cramped_room"))["ppo"]["minibatches"] == 6
 
 
+def test_a_best_response_is_paid_for_its_own_deeds_unless_asked_otherwise() -> None:
+    asked = Asked("fcp", "cramped_room", quick=True, scale=0.1, response=4)
+    found = response_of(asked)
+    assert (found.partner_shaping, found.lambda_) == (0.0, 0.9)
+    assert found.shaping_ticks == pytest.approx(0.9 * 4 * 0.1 * 6e6)
+    assert make(asked, load_layout(ROOT / "layouts" / "cramped_room.yaml")).response.learner.settings == found
+    changed = response_of(replace(asked, changes=(("partner_shaping", 0.5), ("shaping_ticks", 7.0))))
+    assert (changed.partner_shaping, changed.shaping_ticks, changed.lambda_) == (0.5, 7.0, 0.9)
+
+
 def test_runs_become_an_agent_with_a_card(workspace: Path) -> None:
     run = train(workspace, "sp", "--layout", "tiny", "--scale", "0.00004")
     assert {path.name for path in (run / "members").iterdir()} == {
@@ -119,15 +130,20 @@ def test_runs_become_an_agent_with_a_card(workspace: Path) -> None:
     assert table.names == ["0025", "0050"]
     assert table.games.tolist() == [[2, 2], [2, 2]]
     assert PayoffTable.load(run / "payoffs.npz").names == table.names
+    begun = json.loads((run / "run.json").read_text())
+    (run / "run.json").write_text(json.dumps(begun | {"processor": "Another Machine"}))
     bundle = export(workspace, [run], "newcomer")
     assert Catalogue(Workspace(workspace)).bundle("newcomer").sha256 == bundle.sha256
     card = (bundle.path / "card.md").read_text()
     assert "galley learn train sp --layout tiny --seed 0 --quick --scale 4e-05" in card
+    assert f"Another Machine, 1 | 0 | {torch.__version__} |" in card
     facts = json.loads((bundle.path / "training.json").read_text())
     assert facts["tiny"]["ticks"] == 320
     assert facts["tiny"]["scores"]["itself"][2] == 100
     again = train(workspace, "fcp", "--layout", "tiny", "--scale", "0.00002", "--pool", str(run))
     assert "--pool" in command(json.loads((again / "run.json").read_text()))
+    assert "--response" not in command(json.loads((again / "run.json").read_text()))
+    assert "--response 3" in command(described(Asked("mep", "tiny", response=3)))
     response = export(workspace, [again], "response").path
     assert "galley learn train sp --layout tiny --seed 0" in (response / "card.md").read_text()
     facts = json.loads((response / "training.json").read_text())
