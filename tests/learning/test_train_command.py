@@ -140,6 +140,11 @@ def test_runs_become_an_agent_with_a_card(workspace: Path) -> None:
     facts = json.loads((bundle.path / "training.json").read_text())
     assert facts["tiny"]["ticks"] == 320
     assert facts["tiny"]["scores"]["itself"][2] == 100
+    halfway = export(workspace, [run], "halfway", member="0025")
+    assert halfway.sha256 != bundle.sha256
+    assert "| tiny, member 0025 | 320 |" in (halfway.path / "card.md").read_text()
+    with pytest.raises(GalleyError, match="has no member '0052'"):
+        export(workspace, [run], "absent", member="0052")
     again = train(workspace, "fcp", "--layout", "tiny", "--scale", "0.00002", "--pool", str(run))
     assert "--pool" in command(json.loads((again / "run.json").read_text()))
     assert "--response" not in command(json.loads((again / "run.json").read_text()))

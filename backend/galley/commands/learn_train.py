@@ -116,6 +116,10 @@ def train(
 def export(
     runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="Folders of finished runs.")],
     name: Annotated[str, typer.Option(metavar="NAME", help="Name of the agent.")],
+    member: Annotated[
+        str,
+        typer.Option(metavar="MEMBER", help="Another policy of the runs, such as 0040.", show_default="last"),
+    ] = "best",
     unstuck: Annotated[
         int | None,
         typer.Option(
@@ -128,7 +132,9 @@ def export(
     """Make an agent of finished runs, one for each layout; measure it and write its card."""
     from galley.learning.bundling import export as make_bundle
 
-    bundle = make_bundle(workspace, runs, name, unstuck_after_ticks=unstuck, seed=seed, tell=typer.echo)
+    bundle = make_bundle(
+        workspace, runs, name, member=member, unstuck_after_ticks=unstuck, seed=seed, tell=typer.echo
+    )
     typer.echo(f"{bundle.path}: written; galley agents check tries it")
 
 

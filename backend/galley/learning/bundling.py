@@ -36,20 +36,22 @@ def export(
     runs: Sequence[Path],
     name: str,
     *,
+    member: str = "best",
     unstuck_after_ticks: int | None = None,
     seed: int = 0,
     tell: Callable[[str], None] = lambda line: None,
 ) -> Bundle:
     """The agent `name` of the workspace with the policies of finished runs, one run a layout.
 
-    Layouts that the agent has already and no run is given for stay as they are. `training.json` beside the
-    networks keeps how each came to be and what it scored; `card.md` tells it.
+    `member` names another policy of the runs than the final one: a checkpoint, or COLE's strategy of a
+    generation. Layouts that the agent has already and no run is given for stay as they are. `training.json`
+    beside the networks keeps how each came to be and what it scored; `card.md` tells it.
 
     Raises:
         GalleyError: a run is not finished, not of one method with the others, or of a layout given twice.
     """
     place = Workspace(workspace)
-    asked = [run_asked(run) for run in runs]
+    asked = [run_asked(run, member) for run in runs]
     methods = sorted({one["method"] for one in asked})
     if len(methods) > 1:
         raise GalleyError(f"an agent comes from one method, not {' and '.join(methods)}; export them apart")
@@ -60,11 +62,12 @@ def export(
     folder.mkdir(parents=True, exist_ok=True)
     facts = _facts(folder)
     for run, one, layout in zip(runs, asked, layouts, strict=True):
-        weights = {key: tensor.numpy() for key, tensor in load_tensors(run / "members" / "best.pt").items()}
+        policy = load_tensors(run / "members" / f"{member}.pt")
+        weights = {key: tensor.numpy() for key, tensor in policy.items()}
         content = filled(grid_onnx(weights, Encoder(layout, ENCODING).shape))
         (folder / f"{layout.name}.onnx").write_bytes(content)
         begun = origin("cpu") | {key: str(one.pop(key)) for key in ORIGIN if key in one}
-        facts[layout.name] = {"asked": one, **_made(run), **begun, "scores": {}}
+        facts[layout.name] = {"asked": one, **_made(run), **begun, "member": member, "scores": {}}
         pool = [Path(path) for path in one["pool"]]
         facts[layout.name]["pool"] = [run_asked(path) for path in pool]
         for made in map(_made, pool):

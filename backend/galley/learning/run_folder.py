@@ -16,6 +16,7 @@ from galley.kitchen import Layout
 from galley.learning.origin import ORIGIN, origin
 from galley.learning.policy import Policy
 from galley.learning.whole_file import whole_file
+from galley.names import name_fix
 
 COLUMNS: Final = (
     "ticks",
@@ -127,16 +128,19 @@ class RunFolder:
             )
 
 
-def run_asked(path: Path) -> dict[str, Any]:
-    """What was asked of the finished run in a folder.
+def run_asked(path: Path, member: str = "best") -> dict[str, Any]:
+    """What was asked of the run in a folder; of a finished run, where no other member is named.
 
     Raises:
-        GalleyError: the folder holds no run, or one that is not finished.
+        GalleyError: the folder holds no run, or one that has no such member.
     """
     described = path / "run.json"
     if not described.is_file():
         raise GalleyError(f"{path}: is no run (there is no run.json); name a folder that `learn train` made")
-    if not (path / "members" / "best.pt").is_file():
+    if member != "best" and not (path / "members" / f"{member}.pt").is_file():
+        known = sorted(one.stem for one in (path / "members").glob("*.pt"))
+        raise GalleyError(f"{path}: has no member {member!r}; {name_fix(member, known)}")
+    if member == "best" and not (path / "members" / "best.pt").is_file():
         raise GalleyError(f"{path}: the run is not finished; give the command again that began it")
     found: dict[str, Any] = json.loads(described.read_text("utf-8"))
     return found

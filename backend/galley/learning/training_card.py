@@ -104,8 +104,9 @@ def paper_ticks(method: str, layout: str) -> float:
 
 def _made_row(layout: str, one: Mapping[str, Any]) -> str:
     share = one["ticks"] / paper_ticks(one["asked"]["method"], layout)
+    member = one.get("member", "best")
     cells = (
-        layout,
+        layout if member == "best" else f"{layout}, member {member}",
         f"{one['ticks']:,}",
         f"{share:.0%}",
         f"{one['seconds'] / 60:.0f}",
