@@ -67,7 +67,8 @@ def export(
         content = filled(grid_onnx(weights, Encoder(layout, ENCODING).shape))
         (folder / f"{layout.name}.onnx").write_bytes(content)
         begun = origin("cpu") | {key: str(one.pop(key)) for key in ORIGIN if key in one}
-        facts[layout.name] = {"asked": one, **_made(run), **begun, "member": member, "scores": {}}
+        generation = int(member) if member.isdigit() and one["method"].startswith("cole") else None
+        facts[layout.name] = {"asked": one, **_made(run, generation), **begun, "member": member, "scores": {}}
         pool = [Path(path) for path in one["pool"]]
         facts[layout.name]["pool"] = [run_asked(path) for path in pool]
         for made in map(_made, pool):
@@ -82,10 +83,12 @@ def export(
     return load_bundle(folder, folder.as_posix())
 
 
-def _made(run: Path) -> dict[str, Any]:
-    """How far the run went and how long it took."""
+def _made(run: Path, generation: int | None = None) -> dict[str, Any]:
+    """How far the run went and how long it took, up to a generation of COLE if one is named."""
     with (run / "log.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
+    if generation is not None:
+        rows = [row for row in rows if int(row["generation"]) <= generation]
     return {
         "ticks": max(int(row["ticks"]) for row in rows),
         "seconds": float(rows[-1]["seconds"]),
