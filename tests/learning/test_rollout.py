@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from galley.errors import GalleyError
-from galley.kitchen import Encoder, Kitchen
+from galley.kitchen import Encoder, Kitchen, KitchenBatch
 from galley.learning.forwards import Machine
 from galley.learning.payoffs import games_with
 from galley.learning.rollout import Episodes, Pairing, choose, derived_seed
@@ -29,9 +29,24 @@ def test_what_is_recorded_is_what_the_rules_make_of_the_actions() -> None:
                 assert np.array_equal(seen, rollout.seen[tick, index].numpy())
             actions = {int(rollout.seats[one]): int(rollout.actions[tick, one]) for one in (row, again)}
             assert kitchen.step(actions[0], actions[1]) == rollout.rewards[tick, row]
-    assert torch.equal(rollout.shaping[0, :, :2], rollout.shaping[1, :, 6:])  # own and other change places
-    assert torch.equal(rollout.shaping[1, :, :2], rollout.shaping[0, :, 6:])
-    assert rollout.shaping.sum() > 0
+
+
+def test_the_extra_reward_is_told_by_whose_deed_it_is_for() -> None:
+    layout = SMALL.with_rules(horizon_ticks=300)
+    batch = KitchenBatch(layout, 40)
+    rollout = Episodes(layout, 40, CPU).play(policy(1), [Pairing(None, 40)], 5, both=True)
+    joint = np.empty((300, 40, 2), dtype=np.int64)
+    for row, (kitchen, seat) in enumerate(zip(rollout.kitchens, rollout.seats, strict=True)):
+        joint[:, kitchen, seat] = rollout.actions[:, row].numpy()
+    paid = []
+    for actions in joint:
+        batch.step(actions)
+        paid.append(batch.shaping().copy())
+    wanted = np.array(paid)
+    assert wanted.sum() > 0
+    own, other = rollout.shaping.numpy()
+    assert np.array_equal(own, wanted[:, rollout.kitchens, rollout.seats])
+    assert np.array_equal(other, wanted[:, rollout.kitchens, 1 - rollout.seats])
 
 
 def test_log_probabilities_and_values_are_the_learners() -> None:
