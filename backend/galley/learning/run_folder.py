@@ -137,11 +137,11 @@ def run_asked(path: Path, member: str = "best") -> dict[str, Any]:
     described = path / "run.json"
     if not described.is_file():
         raise GalleyError(f"{path}: is no run (there is no run.json); name a folder that `learn train` made")
-    if member != "best" and not (path / "members" / f"{member}.pt").is_file():
+    if not (path / "members" / f"{member}.pt").is_file():
+        if member == "best":
+            raise GalleyError(f"{path}: the run is not finished; give the command again that began it")
         known = sorted(one.stem for one in (path / "members").glob("*.pt"))
         raise GalleyError(f"{path}: has no member {member!r}; {name_fix(member, known)}")
-    if member == "best" and not (path / "members" / "best.pt").is_file():
-        raise GalleyError(f"{path}: the run is not finished; give the command again that began it")
     found: dict[str, Any] = json.loads(described.read_text("utf-8"))
     return found
 

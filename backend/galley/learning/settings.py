@@ -43,7 +43,6 @@ class PPOSettings:
     """What rewards are multiplied by before anything is learned from them, so that a soup is 1."""
     shaping_ticks: float = 2.5e6
     """Ticks over which the extra reward of `KitchenBatch.shaping` falls linearly to 0."""
-
     partner_shaping: float = 1.0
     """Weight of what the other seat does within the extra reward, 0 to 1."""
 
