@@ -18,7 +18,7 @@ from galley.kitchen import Encoder, Layout
 from galley.kitchen.layout_file import find_layout
 from galley.learning.export import grid_onnx
 from galley.learning.export_filled import filled
-from galley.learning.origin import ORIGIN, origin
+from galley.learning.origin import ORIGIN
 from galley.learning.policy import ENCODING
 from galley.learning.run_folder import load_tensors, run_asked
 from galley.learning.training_card import training_card
@@ -66,7 +66,7 @@ def export(
         weights = {key: tensor.numpy() for key, tensor in policy.items()}
         content = filled(grid_onnx(weights, Encoder(layout, ENCODING).shape))
         (folder / f"{layout.name}.onnx").write_bytes(content)
-        begun = origin("cpu") | {key: str(one.pop(key)) for key in ORIGIN if key in one}
+        begun = {key: str(one.pop(key, "")) for key in ORIGIN}
         generation = int(member) if member.isdigit() and one["method"].startswith("cole") else None
         facts[layout.name] = {"asked": one, **_made(run, generation), **begun, "member": member, "scores": {}}
         pool = [Path(path) for path in one["pool"]]
