@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import torch
 
-import galley.learning.ppo as ppo
 from galley.errors import GalleyError
 from galley.kitchen import Layout
 from galley.learning.forwards import Machine
@@ -62,22 +61,6 @@ def test_a_bonus_is_paid_unscaled() -> None:
     bonus = torch.tensor([[1.0], [2.0]])
     _, returns = advantages(rollout_of([10.0, 10.0], [0.0, 0.0]), settings, shaping=0.0, bonus=bonus)
     np.testing.assert_allclose(returns.flatten().numpy(), [5.0, 3.0], rtol=1e-6)
-
-
-def test_minibatches_in_chunks_change_nothing_but_rounding(monkeypatch: pytest.MonkeyPatch) -> None:
-    learner = Learner(SMALL, QUICK, 5, 1, CPU)
-    rollout = Episodes(SMALL, 8, CPU).play(learner.policy, [Pairing(None, 8)], 1)
-    made = []
-    for chunk in (7, 1200):
-        monkeypatch.setattr(ppo, "LARGEST_CHUNK", chunk)
-        policy = copy.deepcopy(learner.policy)
-        figures = update(
-            policy, adam(policy, QUICK), rollout, QUICK, progress=0, shaping=1, seed=3, machine=CPU
-        )
-        made.append((policy, figures))
-    for one, other in zip(made[0][0].parameters(), made[1][0].parameters(), strict=True):
-        torch.testing.assert_close(one, other, rtol=0, atol=2e-4)
-    assert made[0][1].entropy == pytest.approx(made[1][1].entropy, rel=1e-3)
 
 
 def test_threads_share_a_minibatch_and_change_nothing_but_rounding() -> None:

@@ -24,8 +24,12 @@ _NEXT_KERNEL = 3
 Sparse = tuple[NDArray[np.float32], NDArray[np.float32]]
 """Filters of the first convolution as the kernels want them, and the convolution of the map."""
 
-Prepared = Sparse | list[Product]
-"""What is made of the weights on a CPU; the convolutions as matrices on a GPU."""
+Prepared = tuple[Sparse, torch.Tensor] | list[Product]
+"""What is made of the weights.
+
+On a CPU: of those of the first convolution, and of the first dense layer (`_turned`). On a GPU: the
+convolutions as matrices.
+"""
 
 
 class _SparseConvolution(torch.autograd.Function):
@@ -120,21 +124,26 @@ class Policy(nn.Module):
         self, seen: torch.Tensor, prepared: Prepared | None = None
     ) -> tuple[torch.Tensor, torch.Tensor]:
         """Logits float32 [B, 6] and values float32 [B] of observations uint8 [B, 26, H, W]."""
+        weight: torch.Tensor
+        weight, bias = self.dense[0].parameters()
         if isinstance(prepared, list):
             flow = seen.flatten(1).float()
-            for weight, bias in prepared:
-                flow = functional.leaky_relu(functional.linear(flow, weight, bias), SLOPE, inplace=True)
+            for matrix in prepared:
+                flow = functional.leaky_relu(functional.linear(flow, *matrix), SLOPE, inplace=True)
         else:
-            flow = functional.leaky_relu(self.second(self._first(seen, prepared)), SLOPE, inplace=True)
-            flow = functional.leaky_relu(self.third(flow), SLOPE, inplace=True).flatten(1)
-        for layer in self.dense:
+            sparse, weight = prepared or (None, self._turned())
+            flow = functional.leaky_relu(self.second(self._first(seen, sparse)), SLOPE, inplace=True)
+            flow = functional.leaky_relu(self.third(flow), SLOPE, inplace=True)
+            flow = flow.permute(0, 2, 3, 1).flatten(1)
+        flow = functional.leaky_relu(functional.linear(flow, weight, bias), SLOPE, inplace=True)
+        for layer in self.dense[1:]:
             flow = functional.leaky_relu(layer(flow), SLOPE, inplace=True)
         return self.logits(flow).float(), self.value(flow).float().squeeze(1)
 
-    def _first(self, seen: torch.Tensor, prepared: Sparse | None) -> torch.Tensor:
+    def _first(self, seen: torch.Tensor, sparse: Sparse | None) -> torch.Tensor:
         """The first layer's output [B, 25, H, W]."""
         if seen.device.type == "cpu":
-            ready = prepared or _prepared(self.map, self.first)
+            ready = sparse or _prepared(self.map, self.first)
             flow: torch.Tensor = _SparseConvolution.apply(
                 seen, self.map, self.first.weight, self.first.bias, *ready
             )
@@ -142,10 +151,19 @@ class Policy(nn.Module):
         seen = seen.float().contiguous(memory_format=torch.channels_last)
         return functional.leaky_relu(self.first(seen), SLOPE)
 
+    def _turned(self) -> torch.Tensor:
+        """The weights [64, h * w * 25] of the first dense layer, for convolutions that lie channels last.
+
+        To turn what the convolutions give, and in learning its gradient, would take many times as long.
+        """
+        height, width = (side - _NEXT_KERNEL + 1 for side in self.map.shape[1:])
+        weight, _ = self.dense[0].parameters()
+        return weight.view(HIDDEN, FILTERS, height, width).permute(0, 2, 3, 1).flatten(1)
+
     def prepared(self) -> Prepared:
         """What `forward` makes of the weights, for many calls between which they do not change."""
         if self.map.device.type == "cpu":
-            return _prepared(self.map, self.first)
+            return _prepared(self.map, self.first), self._turned().detach()
         return self.products()
 
     def products(self) -> list[Product]:

@@ -13,9 +13,6 @@ from galley.learning.replicas import Replicas
 from galley.learning.rollout import Rollout
 from galley.learning.settings import PPOSettings
 
-LARGEST_CHUNK = 1200
-"""Rows in one pass forward and back on a CPU: as many as its caches hold. Minibatches are summed of them."""
-
 
 @dataclass(frozen=True)
 class UpdateFigures:
@@ -87,24 +84,20 @@ def update(
 
     def passed(replica: Policy, rows: torch.Tensor, gained: torch.Tensor, size: int) -> torch.Tensor:
         """float32 [5]: the figures of some rows of a minibatch of `size`; their gradients go to `replica`."""
-        figures = torch.zeros(5, device=device)
-        most = len(rows) if device.type == "cuda" else LARGEST_CHUNK
-        for chunk, advantage in zip(rows.split(most), gained.split(most), strict=True):
-            with torch.autocast(device.type, torch.bfloat16, enabled=machine.bf16):
-                logits, values = replica(seen[chunk])
-            log_policy = functional.log_softmax(logits, dim=1)
-            now = log_policy.gather(1, actions[chunk].unsqueeze(1)).squeeze(1)
-            entropy = -(log_policy.exp() * log_policy).sum(dim=1)
-            change = now - before[chunk]
-            ratio = change.exp()
-            clipped = ratio.clamp(1 - settings.clip, 1 + settings.clip)
-            policy_loss = -torch.minimum(ratio * advantage, clipped * advantage)
-            value_loss = 0.5 * (values - returns[chunk]).square()
-            loss = policy_loss + settings.value_coefficient * value_loss - entropy_weight * entropy
-            (loss.sum() / size).backward()
-            told = (policy_loss, value_loss, entropy, (ratio != clipped).float(), ratio - 1 - change)
-            figures += torch.stack([one.detach().sum() for one in told]) / size
-        return figures
+        with torch.autocast(device.type, torch.bfloat16, enabled=machine.bf16):
+            logits, values = replica(seen.index_select(0, rows))
+        log_policy = functional.log_softmax(logits, dim=1)
+        now = log_policy.gather(1, actions[rows].unsqueeze(1)).squeeze(1)
+        entropy = -(log_policy.exp() * log_policy).sum(dim=1)
+        change = now - before[rows]
+        ratio = change.exp()
+        clipped = ratio.clamp(1 - settings.clip, 1 + settings.clip)
+        policy_loss = -torch.minimum(ratio * gained, clipped * gained)
+        value_loss = 0.5 * (values - returns[rows]).square()
+        loss = policy_loss + settings.value_coefficient * value_loss - entropy_weight * entropy
+        (loss.sum() / size).backward()
+        told = (policy_loss, value_loss, entropy, (ratio != clipped).float(), ratio - 1 - change)
+        return torch.stack([one.detach().sum() for one in told]) / size
 
     generator = torch.Generator().manual_seed(seed)
     figures = torch.zeros(5, device=device)
