@@ -117,8 +117,12 @@ def test_a_best_response_is_paid_for_its_own_deeds_unless_asked_otherwise() -> N
     assert (found.partner_shaping, found.lambda_) == (0.0, 0.9)
     assert found.shaping_ticks == pytest.approx(0.9 * 4 * 0.1 * 6e6)
     assert make(asked, load_layout(ROOT / "layouts" / "cramped_room.yaml")).response.learner.settings == found
-    changed = response_of(replace(asked, changes=(("partner_shaping", 0.5), ("shaping_ticks", 7.0))))
-    assert (changed.partner_shaping, changed.shaping_ticks, changed.lambda_) == (0.5, 7.0, 0.9)
+    changes = (("partner_shaping", 0.5), ("shaping_ticks", 7.0))
+    changed = response_of(replace(asked, changes=changes))
+    assert (changed.partner_shaping, changed.lambda_) == (0.5, 0.9)
+    assert changed.shaping_ticks == found.shaping_ticks  # what was asked for is the population's
+    changed = response_of(replace(asked, changes=changes, pool=("runs/sp-ring-0",)))
+    assert (changed.partner_shaping, changed.shaping_ticks) == (0.5, 7.0)
 
 
 def test_runs_become_an_agent_with_a_card(workspace: Path) -> None:

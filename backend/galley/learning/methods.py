@@ -146,12 +146,14 @@ def settings_of(asked: Asked) -> tuple[PPOSettings, float]:
 
 
 def response_of(asked: Asked) -> PPOSettings:
-    """The constants of the best response of FCP and MEP."""
+    """The constants of the best response of FCP and MEP.
+
+    Ticks of extra reward that were asked for are those of the population, where one is trained before.
+    """
     settings, total = settings_of(asked)
     changes = {**RESPONSE, "shaping_ticks": RESPONSE_SHAPING * asked.response * total}
-    return settings.changed(
-        **{key: value for key, value in changes.items() if key not in dict(asked.changes)}
-    )
+    kept = {key for key, _ in asked.changes if key != "shaping_ticks" or asked.pool}
+    return settings.changed(**{key: value for key, value in changes.items() if key not in kept})
 
 
 def cole_of(asked: Asked) -> ColeSettings:
