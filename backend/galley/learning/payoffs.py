@@ -54,7 +54,7 @@ def games_among(
     for tick in range(layout.rules.horizon_ticks):
         for seat, side in enumerate(sides):
             encoder.seat(batch.states, side, seen[seat].numpy())
-        parts = seen.flatten(0, 1)[order].chunk(size)
+        parts = seen.flatten(0, 1).index_select(0, order).chunk(size)
         logits = torch.cat([one.cpu() for one, _ in forwards(list(zip(ready, parts, strict=True)))])
         joint[order] = choose(logits, torch.rand(len(joint), generator=generator))
         batch.step(joint.view(2, -1).T.contiguous().numpy())

@@ -71,7 +71,7 @@ class _SparseConvolution(torch.autograd.Function):
         return None, None, whole, torch.from_numpy(bias), None, None
 
 
-def _prepared(map_: torch.Tensor, layer: nn.Conv2d) -> Sparse:
+def _sparse(map_: torch.Tensor, layer: nn.Conv2d) -> Sparse:
     """The layer's filters as the kernels want them, and the convolution of the map."""
     channels, height, width = map_.shape
     size = layer.weight.shape[2]
@@ -143,7 +143,7 @@ class Policy(nn.Module):
     def _first(self, seen: torch.Tensor, sparse: Sparse | None) -> torch.Tensor:
         """The first layer's output [B, 25, H, W]."""
         if seen.device.type == "cpu":
-            ready = sparse or _prepared(self.map, self.first)
+            ready = sparse or _sparse(self.map, self.first)
             flow: torch.Tensor = _SparseConvolution.apply(
                 seen, self.map, self.first.weight, self.first.bias, *ready
             )
@@ -163,7 +163,7 @@ class Policy(nn.Module):
     def prepared(self) -> Prepared:
         """What `forward` makes of the weights, for many calls between which they do not change."""
         if self.map.device.type == "cpu":
-            return _prepared(self.map, self.first), self._turned().detach()
+            return _sparse(self.map, self.first), self._turned().detach()
         return self.products()
 
     def products(self) -> list[Product]:

@@ -85,7 +85,7 @@ def update(
     def passed(replica: Policy, rows: torch.Tensor, gained: torch.Tensor, size: int) -> torch.Tensor:
         """float32 [5]: the figures of some rows of a minibatch of `size`; their gradients go to `replica`."""
         with torch.autocast(device.type, torch.bfloat16, enabled=machine.bf16):
-            logits, values = replica(seen.index_select(0, rows))
+            logits, values = replica(seen.index_select(0, rows))  # several times as quick as seen[rows]
         log_policy = functional.log_softmax(logits, dim=1)
         now = log_policy.gather(1, actions[rows].unsqueeze(1)).squeeze(1)
         entropy = -(log_policy.exp() * log_policy).sum(dim=1)
