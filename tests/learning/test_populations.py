@@ -127,11 +127,25 @@ def test_cole_deals_by_its_ratio_and_counts_visits() -> None:
     assert int(training.visits.sum()) == before + 2
 
 
+def test_cole_deals_among_as_many_partners_as_asked_for() -> None:
+    settings = QUICK.changed(ticks=12 * 13)
+    cole = ColeSettings(generations=1, updates=1, games=1, ratio=(1, 3), partners=5)
+    training = Cole(SMALL, settings, cole, 1, CPU)
+    pairings = training._pairings()
+    assert [pairing.partner is None for pairing in pairings] == [True] + 5 * [False]
+    assert [pairing.kitchens for pairing in pairings] == [3, 2, 2, 2, 2, 2]
+    assert int(training.visits.sum()) == 5
+
+
 def test_cole_refuses_what_cannot_be() -> None:
     with pytest.raises(GalleyError, match="use one of 0:4 1:3 2:2 3:1"):
         Cole(SMALL, QUICK, ColeSettings(ratio=(4, 0)), 1, CPU)
     with pytest.raises(GalleyError, match="too few for ratio"):
         Cole(SMALL, QUICK.changed(ticks=24), ColeSettings(), 1, CPU)
+    with pytest.raises(GalleyError, match="partners is 0"):
+        Cole(SMALL, QUICK, ColeSettings(partners=0), 1, CPU)
+    with pytest.raises(GalleyError, match="give at most 1"):
+        Cole(SMALL, QUICK, ColeSettings(cap=2), 1, CPU, {"one": policy(1), "two": policy(2)})
 
 
 def test_the_population_of_fcp_is_three_skills_of_every_seed() -> None:
@@ -166,6 +180,13 @@ def test_a_pool_is_the_first_population_of_cole() -> None:
     while not training.finished:
         training.step()
     assert training.table.names == ["one", "two", "0001"]
+
+
+def test_the_pool_of_cole_stays_when_its_population_is_full() -> None:
+    training = Cole(SMALL, QUICK, COLE, 1, CPU, {"one": policy(1), "two": policy(2)})
+    while not training.finished:
+        training.step()
+    assert training.table.names == ["one", "two", "0004"]
 
 
 def test_mep_pays_for_what_the_population_rarely_does() -> None:

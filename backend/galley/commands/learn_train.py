@@ -36,6 +36,10 @@ def train(
     ratio: Annotated[
         str, typer.Option(metavar="A:B", help="COLE: kitchens with itself : with others.")
     ] = "1:3",
+    partners: Annotated[
+        int | None,
+        typer.Option(min=1, metavar="N", help="COLE: partners drawn for an update.", show_default="B"),
+    ] = None,
     generations: Annotated[
         int | None, typer.Option(min=1, metavar="N", help="COLE: generations, whatever the scale.")
     ] = None,
@@ -96,6 +100,7 @@ def train(
         quick=quick,
         scale=scale,
         ratio=ratio,
+        partners=partners,
         weighted=not no_wpg,
         exploration=0.0 if no_sucg else ColeSettings.exploration,
         generations=generations,

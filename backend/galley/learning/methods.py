@@ -59,6 +59,7 @@ class Asked:
     quick: bool = False
     scale: float = 1.0
     ratio: str = "1:3"
+    partners: int | None = None
     weighted: bool = True
     exploration: float = ColeSettings.exploration
     generations: int | None = None
@@ -170,6 +171,7 @@ def cole_of(asked: Asked) -> ColeSettings:
         generations=generations,
         updates=asked.generation_updates or ColeSettings.updates,
         ratio=RATIOS[asked.ratio],
+        partners=asked.partners,
         exploration=asked.exploration,
         weighted=asked.weighted,
     )

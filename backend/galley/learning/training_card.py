@@ -68,8 +68,8 @@ def command(asked: Mapping[str, Any]) -> str:
         words += [f"--ratio {asked['ratio']}"] if asked["ratio"] != "1:3" else []
         words += [] if asked["weighted"] else ["--no-wpg"]
         words += [] if asked["exploration"] else ["--no-sucg"]
-    for option in ("generations", "generation_updates", "population"):
-        if asked[option] is not None:
+    for option in ("partners", "generations", "generation_updates", "population"):
+        if asked.get(option) is not None:
             words.append(f"--{option.replace('_', '-')} {asked[option]}")
     words += [f"--pool {run}" for run in asked["pool"]]
     response = asked.get("response", Asked.response)

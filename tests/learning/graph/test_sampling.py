@@ -92,6 +92,8 @@ def test_one_of_the_earliest_ten_leaves_a_population_that_is_too_large() -> None
     assert min(left.count(one) for one in range(10)) > 25
     assert removal(4, generator, cap=3, earliest=1) == 0
     assert {removal(3, generator, cap=2) for _ in range(50)} == {0, 1}
+    assert {removal(6, generator, cap=5, earliest=2, kept=3) for _ in range(50)} == {3, 4}
+    assert removal(4, generator, cap=3, kept=2) == 2
     assert removal(51, np.random.default_rng(9)) == removal(51, np.random.default_rng(9))
     with pytest.raises(ValueError, match="at least 1"):
         removal(51, generator, cap=0)

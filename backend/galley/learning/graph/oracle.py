@@ -38,17 +38,21 @@ def accepted(centralities: NDArray[np.floating], strategy: int, share: float = 0
 
 
 def removal(
-    size: int, generator: np.random.Generator, cap: int = CAP, earliest: int = EARLIEST
+    size: int, generator: np.random.Generator, cap: int = CAP, earliest: int = EARLIEST, kept: int = 0
 ) -> int | None:
     """The number of the strategy that a population of `size` lets go: one of the earliest; None up to `cap`.
 
-    Never the newest.
+    Never the newest, and none of the first `kept`.
 
-    Source: COLE, App. C.
+    Source: COLE, App. C; `kept` is ours.
 
     Raises:
-        ValueError: `cap` or `earliest` are below 1.
+        ValueError: `cap` or `earliest` are below 1; no strategy may go.
     """
     if cap < 1 or earliest < 1:
         raise ValueError(f"cap and earliest must be at least 1, not {cap} and {earliest}")
-    return None if size <= cap else int(generator.integers(min(earliest, size - 1)))
+    if size <= cap:
+        return None
+    if not 0 <= kept < size - 1:
+        raise ValueError(f"kept must be 0 to {size - 2} of {size} strategies, not {kept}")
+    return kept + int(generator.integers(min(earliest, size - 1 - kept)))

@@ -46,6 +46,8 @@ class ColeSettings:
     """Parts of an update's kitchens played with itself, and with partners from the distribution."""
     cap: int = 50
     """Largest population."""
+    partners: int | None = None
+    """Partners drawn for an update, who share all but its own kitchens; None: one for each part."""
     exploration: float = 0.01
     """SUCG's c. Ours: a strategy never visited gets about as much as one of fifty after 25 updates."""
     share: float = 0.1
@@ -66,8 +68,8 @@ class ColeSettings:
         found = []
         if min(self.ratio) < 0 or self.ratio[1] < 1:
             found.append(f"ratio is {self.ratio[0]}:{self.ratio[1]}; use one of 0:4 1:3 2:2 3:1")
-        for name in ("generations", "updates", "tries", "games", "permutations"):
-            if getattr(self, name) < 1:
+        for name in ("generations", "updates", "tries", "games", "permutations", "partners"):
+            if getattr(self, name) is not None and getattr(self, name) < 1:
                 found.append(f"{name} is {getattr(self, name)}; use a whole number of at least 1")
         if self.cap < 2:
             found.append(f"cap is {self.cap}; use at least 2")
@@ -83,11 +85,11 @@ _FIRST: Final = "0000"
 class Cole:
     """COLE-SV and COLE-R.
 
-    The population begins with `first`, policies by name, or with one untrained strategy. The first generation
-    begins untrained, each other goes on from the strategy before it, with kitchens dealt to itself and to
-    partners drawn by SUCG for every update; then the payoffs of the new strategy with all others are measured
-    on both seats. If its preference centrality does not rank among the best, its updates go on, up to the
-    given tries.
+    The population begins with `first`, policies by name that are never removed, or with one untrained
+    strategy. The first generation begins untrained, each other goes on from the strategy before it, with
+    kitchens dealt to itself and to partners drawn by SUCG for every update; then the payoffs of the new
+    strategy with all others are measured on both seats. If its preference centrality does not rank among the
+    best, its updates go on, up to the given tries.
 
     Source: COLE paper, Algorithm 1.
 
@@ -106,9 +108,15 @@ class Cole:
     ) -> None:
         problems = cole.problems()
         kitchens = kitchens_of(layout, settings)
-        if kitchens < sum(cole.ratio):
+        if kitchens < cole.ratio[0] + max(cole.ratio[1], cole.partners or 0):
             problems.append(
                 f"{settings.ticks} ticks make {kitchens} kitchens, too few for ratio {cole.ratio}"
+                + (f" and {cole.partners} partners" if cole.partners else "")
+            )
+        if first and len(first) >= cole.cap:
+            problems.append(
+                f"the pool has {len(first)} strategies, which all stay; "
+                f"give at most {cole.cap - 1}, as a population holds {cole.cap}"
             )
         if problems:
             raise GalleyError("; ".join(problems))
@@ -120,6 +128,7 @@ class Cole:
         self.generation = 0
         self.tried = 0
         self.made = 0
+        self.pooled = len(first or ())
         self.first = dict(first or {_FIRST: self.learner.frozen()})
         self.visits: NDArray[np.int64] = np.zeros(len(self.first), dtype=np.int64)
         self.table = PayoffTable()
@@ -183,11 +192,12 @@ class Cole:
     def _pairings(self) -> list[Pairing]:
         """The kitchens of the next update, dealt by the ratio; drawn partners count as visited."""
         own, others = self.cole.ratio
+        count = self.cole.partners or others
         generator = np.random.default_rng(derived_seed(self.seed, _DEAL, self.learner.done))
-        drawn, self.visits = draw_partners(self.phi, self.visits, self.cole.exploration, others, generator)
+        drawn, self.visits = draw_partners(self.phi, self.visits, self.cole.exploration, count, generator)
         partners: list[Policy | None] = [None] * own + [self.members[one] for one in drawn.tolist()]
-        size = self.episodes.batch.size
-        shares = np.diff(np.arange(len(partners) + 1) * size // len(partners)).tolist()
+        parts = np.array([0] + [count] * own + [others] * count).cumsum()
+        shares = np.diff(parts * self.episodes.batch.size // parts[-1]).tolist()
         return [Pairing(partner, count) for partner, count in zip(partners, shares, strict=True)]
 
     def _end(self) -> dict[str, Policy]:
@@ -207,6 +217,7 @@ class Cole:
             len(self.table),
             np.random.default_rng(derived_seed(self.seed, _REMOVE, self.generation)),
             cap=self.cole.cap,
+            kept=self.pooled,
         )
         if gone is not None:
             self.table.remove(gone)
