@@ -97,3 +97,5 @@ def test_one_of_the_earliest_ten_leaves_a_population_that_is_too_large() -> None
     assert removal(51, np.random.default_rng(9)) == removal(51, np.random.default_rng(9))
     with pytest.raises(ValueError, match="at least 1"):
         removal(51, generator, cap=0)
+    with pytest.raises(ValueError, match="kept must be 0 to 2 of 4"):
+        removal(4, generator, cap=3, kept=3)

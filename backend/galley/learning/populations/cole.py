@@ -63,6 +63,11 @@ class ColeSettings:
     weighted: bool = True
     """Whether solvers weigh by PageRank (False: the ablation COLE-SV minus WPG)."""
 
+    @property
+    def drawn(self) -> int:
+        """Partners drawn for an update."""
+        return self.ratio[1] if self.partners is None else self.partners
+
     def problems(self) -> list[str]:
         """What cannot be, each with its fix."""
         found = []
@@ -108,10 +113,10 @@ class Cole:
     ) -> None:
         problems = cole.problems()
         kitchens = kitchens_of(layout, settings)
-        if kitchens < cole.ratio[0] + max(cole.ratio[1], cole.partners or 0):
+        if kitchens < cole.ratio[0] + max(cole.ratio[1], cole.drawn):
             problems.append(
-                f"{settings.ticks} ticks make {kitchens} kitchens, too few for ratio {cole.ratio}"
-                + (f" and {cole.partners} partners" if cole.partners else "")
+                f"{settings.ticks} ticks make {kitchens} kitchens, too few for ratio {cole.ratio} "
+                f"and {cole.drawn} partners"
             )
         if first and len(first) >= cole.cap:
             problems.append(
@@ -192,13 +197,13 @@ class Cole:
     def _pairings(self) -> list[Pairing]:
         """The kitchens of the next update, dealt by the ratio; drawn partners count as visited."""
         own, others = self.cole.ratio
-        count = self.cole.partners or others
+        count = self.cole.drawn
         generator = np.random.default_rng(derived_seed(self.seed, _DEAL, self.learner.done))
         drawn, self.visits = draw_partners(self.phi, self.visits, self.cole.exploration, count, generator)
         partners: list[Policy | None] = [None] * own + [self.members[one] for one in drawn.tolist()]
         parts = np.array([0] + [count] * own + [others] * count).cumsum()
         shares = np.diff(parts * self.episodes.batch.size // parts[-1]).tolist()
-        return [Pairing(partner, count) for partner, count in zip(partners, shares, strict=True)]
+        return [Pairing(partner, share) for partner, share in zip(partners, shares, strict=True)]
 
     def _end(self) -> dict[str, Policy]:
         """The policy that joined at the end of a generation, by its name; none if it is to be tried again."""
