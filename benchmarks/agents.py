@@ -31,7 +31,7 @@ from galley.agents.network import Network, NetworkAgent  # noqa: E402
 from galley.agents.together import act_together  # noqa: E402
 from galley.kitchen import Encoder, KitchenBatch, Layout  # noqa: E402
 from galley.kitchen.layout_file import load_layout  # noqa: E402
-from tests.agents.newcomers import cole_policy  # noqa: E402
+from tests.agents.admission.newcomers import cole_policy  # noqa: E402
 
 LAYOUT = "counter_circuit"
 ROUNDS = 500

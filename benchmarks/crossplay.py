@@ -5,7 +5,8 @@
 
 A cell is 200 games of 400 ticks on Counter Circuit in one seat order: of the shipped clones with each other,
 and of the paper's network (random weights, `grid` observations) with itself, as it is and with its channels
-filled up (`galley.learning.export_filled`). Solvers run on a population of 50. Times are processor times of
+filled up (`galley.learning.bundles.filled_convolutions`).
+Solvers run on a population of 50. Times are processor times of
 this process, the best of three; kernels are compiled before.
 """
 
@@ -26,11 +27,11 @@ sys.path.insert(0, str(ROOT))
 
 from galley.agents.bundle import Bundle, load_bundle  # noqa: E402
 from galley.agents.play import play_in_seats  # noqa: E402
+from galley.evaluation.game_graph import centrality_matrix, graphic_shapley  # noqa: E402
 from galley.kitchen import Encoder, Layout  # noqa: E402
 from galley.kitchen.layout_file import load_layout  # noqa: E402
-from galley.learning.export_filled import filled  # noqa: E402
-from galley.learning.graph import centrality_matrix, graphic_shapley  # noqa: E402
-from tests.agents.newcomers import cole_policy  # noqa: E402
+from galley.learning.bundles.filled_convolutions import filled  # noqa: E402
+from tests.agents.admission.newcomers import cole_policy  # noqa: E402
 
 COMMAND = "python benchmarks/crossplay.py"
 GAMES = 200

@@ -28,13 +28,13 @@ import numpy as np  # noqa: E402
 import torch  # noqa: E402
 
 from galley.kitchen.layout_file import load_layout  # noqa: E402
-from galley.learning.learner import Learner, kitchens_of  # noqa: E402
-from galley.learning.methods import Asked, cole_of, machine_of, settings_of  # noqa: E402
-from galley.learning.payoffs import games_with  # noqa: E402
-from galley.learning.policy import Policy  # noqa: E402
-from galley.learning.ppo import update  # noqa: E402
+from galley.learning.asked import Asked, cole_of, machine_of, settings_of  # noqa: E402
+from galley.learning.ppo.games import games_with  # noqa: E402
+from galley.learning.ppo.learner import Learner, kitchens_of  # noqa: E402
+from galley.learning.ppo.policy import Policy  # noqa: E402
+from galley.learning.ppo.rollout import Episodes, Pairing  # noqa: E402
+from galley.learning.ppo.update import update  # noqa: E402
 from galley.learning.process import prepare_process  # noqa: E402
-from galley.learning.rollout import Episodes, Pairing  # noqa: E402
 
 LAYOUT = "counter_circuit"
 POPULATION = 50

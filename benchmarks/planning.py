@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from galley.agents.protocol import Agent  # noqa: E402
-from galley.analysis.evaluate import Team, evaluate, play_trials  # noqa: E402
+from galley.evaluation.teams import Team, evaluate, play_trials  # noqa: E402
 from galley.kitchen import Kitchen, Layout  # noqa: E402
 from galley.kitchen.layout_file import load_layout  # noqa: E402
 from galley.kitchen.measures import measures  # noqa: E402

@@ -26,7 +26,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from benchmarks.random_kitchens import random_kitchen  # noqa: E402
-from galley.analysis.evaluate import Team, evaluate  # noqa: E402
+from galley.evaluation.teams import Team, evaluate  # noqa: E402
 from galley.kitchen import Layout  # noqa: E402
 
 KITCHENS = 60

@@ -15,13 +15,13 @@ from galley.commands import (
     evaluate,
     export,
     init,
-    learn,
     researchers,
     serve,
     simulate,
     studies,
     trajectories,
 )
+from galley.commands.learn import app as learn
 from galley.errors import GalleyError
 
 app = typer.Typer(

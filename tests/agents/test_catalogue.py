@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-import galley.agents.trial as trials
+import galley.agents.admission.trial as trials
 from galley.agents.catalogue import Catalogue
 from galley.agents.scripted import Stay
 from galley.errors import GalleyError

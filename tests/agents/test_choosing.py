@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from galley.agents.choosing import choose, draws_for
-from galley.randomness import uniform
+from galley.compiled.randomness import uniform
 
 LOGITS = hnp.arrays(np.float32, (3, 6), elements=st.floats(-50, 50, width=32))
 BARRED = hnp.arrays(np.bool_, (3, 6))

@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from galley.server.templates import templates
-from galley.study.languages import choose_language
-from galley.study.questionnaire import Questionnaire
 from galley.study.study import load_study
+from galley.study.written.languages import choose_language
+from galley.study.written.questionnaire import Questionnaire
 from galley.translations import Catalogues, language_name
 from galley.workspace import Workspace
 from tests.browser.site import ROOT

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 
-from galley.server.input import MAX_WAITING
+from galley.server.rounds.key_state import MAX_WAITING
 from tests.browser.participant import Participant
 from tests.serving import run_galley, served
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from galley.agents.admission.trial import trial
 from galley.agents.bundle import Bundle
 from galley.agents.catalogue import Catalogue
 from galley.agents.protocol import Agent
 from galley.agents.together import act_together
-from galley.agents.trial import trial
 from galley.kitchen import STAY, Kitchen, Layout
 from galley.kitchen.layout_file import find_layout
 from galley.workspace import Workspace

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 from sqlalchemy import Connection, text
 
 from galley.records import Arrival, Planned, Store, VisitRow
-from galley.study.assignment import allocate, capacity, cell_number, cells
-from galley.study.plan import plan_visit, visit_seed
 from galley.study.study import Study
+from galley.study.visit.condition_slots import allocate, capacity, cell_number, cells
+from galley.study.visit.plan import plan_visit, visit_seed
 
 MINUTE_MS = 60_000.0
 IN_FLIGHT = 50

@@ -9,13 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from galley.records import Store, queries
-from galley.study.assignment import cells
-from galley.study.plan import Plan
+from galley.records import Store
+from galley.records.store import queries
 from galley.study.study import Study, load_study
+from galley.study.visit.condition_slots import cells
+from galley.study.visit.plan import Plan
 from tests.faults.balance import Recruiting, counted
-from tests.study.test_design import combination
 from tests.study.workspaces import study_workspace
+from tests.study.written.test_design import combination
 
 ARRIVALS = 1000
 QUOTA = 40

@@ -14,8 +14,8 @@ from sqlalchemy import Connection, select
 from galley.agents.scripted import Random
 from galley.kitchen import STAY
 from galley.records import Store
-from galley.records.tables import ROUNDS, SEATS, TICKS
-from galley.records.verify import verify_study
+from galley.records.database.tables import ROUNDS, SEATS, TICKS
+from galley.records.reading.verify import verify_study
 from galley.simulate.simulation import Simulation, simulate
 from tests.server.helpers import Served, serving
 from tests.study.workspaces import study_workspace

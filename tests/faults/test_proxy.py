@@ -17,12 +17,12 @@ import httpx
 import pytest
 
 from galley.records import Store
-from galley.records.researchers import Researchers
-from galley.server.admin.passwords import Passwords
-from tests.admin.office import NAME, PASSWORD, csrf
+from galley.records.store.researcher_accounts import Researchers
+from galley.server.researcher.passwords import Passwords
 from tests.faults import test_takeover as takeover
 from tests.postgres import Postgres, running
 from tests.server.helpers import wait_until
+from tests.server.researcher.office import NAME, PASSWORD, csrf
 from tests.serving import Server, served
 
 ROOT = Path(__file__).parents[2]

@@ -15,9 +15,9 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 
 from galley.kitchen import Kitchen, Layout
+from galley.protocol.scene import Scene
 from galley.records import RoundRow, Store
-from galley.records.verify import verify_study
-from galley.server.scene import Scene
+from galley.records.reading.verify import verify_study
 from galley.workspace import Workspace
 from tests.postgres import Postgres, running
 from tests.server.helpers import Player, Served, serving

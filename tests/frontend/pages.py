@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from galley.server.templates import templates
-from galley.study.questionnaire import Questionnaire
-from galley.study.recruitment import VISIT_OUTCOMES
+from galley.study.written.questionnaire import Questionnaire
+from galley.study.written.recruitment import VISIT_OUTCOMES
 
 FRONTEND = Path(__file__).parents[2] / "frontend"
 HOSTILE = "<script>alert(1)</script>\"'><img src=x onerror=alert(1)>"

@@ -11,8 +11,8 @@ import pytest
 
 from galley.kitchen.codes import THINGS
 from galley.server.templates import templates
-from galley.study.config import HATS
-from galley.study.texts import PICTURES, TILES
+from galley.study.written.study_file import HATS
+from galley.study.written.texts import PICTURES, TILES
 from tests.frontend.pages import FRONTEND, Page
 
 DRAWINGS = sorted((FRONTEND / "sprites").glob("*.svg"))

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from galley.server import wire
+from galley.protocol import messages as wire
 from tests.frontend.pages import FRONTEND
 
 TEXT = (FRONTEND / "js/wire.js").read_text(encoding="utf-8")

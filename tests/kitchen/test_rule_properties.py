@@ -12,8 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from galley.kitchen import Kitchen, KitchenBatch, Layout, from_view, observation_kernels, rules, view
+from galley.kitchen import Kitchen, KitchenBatch, Layout, from_view, observation_kernels, view
 from galley.kitchen.observations import ENCODINGS, Encoder
+from galley.kitchen.rules import classic as rules
 from galley.kitchen.state import state_problem
 from galley.kitchen.trajectory import play
 from tests.kitchen.reference_rules import SlowKitchen

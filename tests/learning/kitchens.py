@@ -5,9 +5,9 @@ from __future__ import annotations
 import torch
 
 from galley.kitchen import Layout
-from galley.learning.forwards import Machine
-from galley.learning.policy import Policy
-from galley.learning.settings import PPOSettings
+from galley.learning.ppo.constants import PPOSettings
+from galley.learning.ppo.forwards import Machine
+from galley.learning.ppo.policy import Policy
 
 CPU = Machine(torch.device("cpu"))
 

@@ -19,14 +19,14 @@ from typer.testing import CliRunner
 from galley.agents.catalogue import Catalogue
 from galley.cli import app
 from galley.errors import GalleyError
+from galley.evaluation.game_graph import PayoffTable
 from galley.kitchen.layout_file import load_layout
-from galley.learning.bundling import export
-from galley.learning.graph import PayoffTable
-from galley.learning.learner import Learner
-from galley.learning.methods import Asked, described, make, parsed_changes, pooled, response_of
+from galley.learning.asked import Asked, described, make, parsed_changes, pooled, response_of
+from galley.learning.bundles.from_runs import export
+from galley.learning.bundles.training_card import command, paper_ticks
+from galley.learning.ppo.learner import Learner
 from galley.learning.run_folder import RunFolder
 from galley.learning.run_payoffs import run_payoffs
-from galley.learning.training_card import command, paper_ticks
 from galley.workspace import Workspace
 from tests.learning.kitchens import CPU, QUICK
 

@@ -23,8 +23,8 @@ from galley.kitchen import (
     from_view,
 )
 from galley.planning.distances import distances
+from galley.planning.kernels.myopic_kernel import NOWHERE, target
 from galley.planning.myopic import Myopic
-from galley.planning.myopic_kernel import NOWHERE, target
 from tests.planning.layouts import FORCED, MIXED, ROOM, layouts
 
 ONION, TOMATO, DISH, ONION_SOUP, TOMATO_SOUP = 1, 2, 3, 4, 5

@@ -7,8 +7,8 @@ from collections.abc import Callable
 import pytest
 
 from galley.agents.protocol import Agent
-from galley.analysis.evaluate import Team, evaluate
 from galley.errors import GalleyError
+from galley.evaluation.teams import Team, evaluate
 from galley.kitchen import Kitchen, Layout
 from galley.planning.centralized import Centralized
 from galley.planning.robots import MDP, QMDP

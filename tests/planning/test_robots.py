@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from galley.compiled.draw_kernel import draw
+from galley.compiled.randomness import uniform
 from galley.errors import GalleyError
 from galley.kitchen import NORTH, STAY, Kitchen, Layout
 from galley.kitchen.state import ChefView, KitchenView, PotView, from_view
 from galley.planning.brain import brain
 from galley.planning.distances import distances
-from galley.planning.draw_kernel import draw
 from galley.planning.myopic import Myopic
 from galley.planning.robots import MDP, QMDP
 from galley.planning.subtasks import SUBTASKS, feasible_subtasks, myopic_subtask
 from galley.planning.trials import run
-from galley.randomness import uniform
 from tests.planning.kitchens import random_kitchen
 
 ROOM = Layout.from_ascii(

@@ -10,8 +10,8 @@ import numpy as np
 
 from galley.kitchen import Kitchen, Layout
 from galley.records import ClockRow, KeyRow, PauseRow, Store, TickRow, VisitRow
-from galley.records.replay import state_bytes
-from galley.study.plan import Plan, Step
+from galley.records.reading.round_replay import state_bytes
+from galley.study.visit.plan import Plan, Step
 
 START_MS = 1_760_000_000_000
 TINY = Layout.from_ascii("tiny", "XXPXX\nO  2O\nX1  X\nXDXSX", horizon_ticks=40)

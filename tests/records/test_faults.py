@@ -12,7 +12,8 @@ import pytest
 from sqlalchemy.exc import OperationalError
 
 from galley.errors import GalleyError
-from galley.records import Store, TickRow, engine
+from galley.records import Store, TickRow
+from galley.records.database import engine
 from tests.records.helpers import START_MS, begin, joint_actions, one_soup, open_round, play, tick_rows
 
 

@@ -9,14 +9,14 @@ import httpx
 import pytest
 
 from galley.records import Store
-from galley.records.researchers import Researchers
-from galley.server.admin.passwords import Passwords
+from galley.records.store.researcher_accounts import Researchers
 from galley.server.app import create_app
+from galley.server.researcher.passwords import Passwords
 from galley.server.settings import Settings
-from tests.admin.office import NAME, PASSWORD, log_in
 from tests.security.hostile import hostile_workspace
 from tests.security.walk import all_routes
 from tests.server.helpers import Participant, Served, serving
+from tests.server.researcher.office import NAME, PASSWORD, log_in
 
 
 @dataclass(frozen=True)

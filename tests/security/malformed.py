@@ -7,7 +7,7 @@ import random
 from collections.abc import Iterator
 from typing import Any
 
-from galley.server.wire import CLIENT, MAX_MESSAGE_CHARS
+from galley.protocol.messages import CLIENT, MAX_MESSAGE_CHARS
 
 ODD: tuple[Any, ...] = (
     *(

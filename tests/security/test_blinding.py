@@ -10,10 +10,10 @@ import httpx
 import pytest
 from sqlalchemy import select
 
-from galley.records.tables import SEATS
+from galley.records.database.tables import SEATS
 from galley.simulate.simulation import Simulation, simulate
-from galley.study.plan import plan_visit, visit_seed
 from galley.study.study import load_study
+from galley.study.visit.plan import plan_visit, visit_seed
 from galley.workspace import Workspace, frontend_folder
 from tests.security.blinding import AGENTS, blind_workspace
 from tests.security.recording import recorded

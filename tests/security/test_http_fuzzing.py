@@ -8,12 +8,12 @@ from typing import Any
 import schemathesis
 from hypothesis import HealthCheck, given, settings
 
-from galley.server.admin.gate import SESSION_COOKIE
-from galley.server.origin import HEADERS
-from tests.admin.office import csrf
+from galley.server.headers import HEADERS
+from galley.server.researcher.login import SESSION_COOKIE
 from tests.security.conftest import Site
 from tests.security.hostile import SCRIPTS
 from tests.security.walk import TOKEN, class_of
+from tests.server.researcher.office import csrf
 
 SHARED_OUT = 5
 """A route gets this part of the examples of the profile."""

@@ -9,7 +9,7 @@ import pytest
 from sqlalchemy import func, select
 from websockets.exceptions import ConnectionClosed
 
-from galley.records.tables import ROUNDS, TICKS
+from galley.records.database.tables import ROUNDS, TICKS
 from tests.security.conftest import Site
 from tests.security.malformed import malformed
 from tests.server.helpers import Player

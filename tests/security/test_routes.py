@@ -10,11 +10,11 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from galley.records import Store
-from galley.server.origin import HEADERS
-from tests.admin.office import NAME, PASSWORD, csrf
+from galley.server.headers import HEADERS
 from tests.security.conftest import Site
 from tests.security.walk import OPEN, RESEARCHER, TOKEN, class_of
 from tests.server.helpers import Participant
+from tests.server.researcher.office import NAME, PASSWORD, csrf
 
 TOKENS = 150
 CHI_SQUARE_63 = 103.4

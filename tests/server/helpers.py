@@ -22,7 +22,7 @@ from galley.records import Store
 from galley.server.app import create_app
 from galley.server.run import listen, server_config
 from galley.server.settings import Settings
-from galley.study.questionnaire import Questionnaire
+from galley.study.written.questionnaire import Questionnaire
 from galley.workspace import Workspace
 
 QUICK = """

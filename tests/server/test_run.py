@@ -13,7 +13,7 @@ import pytest
 
 from galley.errors import GalleyError, InvalidFiles
 from galley.records import Store
-from galley.records.engine import database_url
+from galley.records.database.engine import database_url
 from galley.server.run import reached_at, serve
 from tests.server.helpers import ONE_ROUND
 from tests.study.workspaces import study_workspace

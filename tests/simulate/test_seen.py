@@ -13,7 +13,7 @@ from galley.agents.scripted import Random
 from galley.kitchen import Kitchen, Layout
 from galley.kitchen.codes import DELIVERIES
 from galley.planning.myopic import Myopic
-from galley.server.scene import Scene, happenings
+from galley.protocol.scene import Scene, happenings
 from galley.simulate.seen import KEY_OF, Seen
 
 RING = Layout.from_ascii("ring", "XXPXX\nO1 2O\nX   X\nXDXSX", cook_time_ticks=5, horizon_ticks=300)

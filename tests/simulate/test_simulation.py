@@ -9,8 +9,8 @@ import pytest
 from sqlalchemy import Connection, select
 
 from galley.errors import GalleyError
-from galley.records.tables import RESPONSES, VISITS
-from galley.simulate.figures import in_words
+from galley.records.database.tables import RESPONSES, VISITS
+from galley.simulate.results import in_words
 from galley.simulate.simulation import Simulation, simulate
 from tests.server.helpers import Served
 from tests.serving import run_galley

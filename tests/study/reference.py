@@ -14,8 +14,9 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
-from galley.files import FileModel
-from galley.study import config, factors, items, languages, questionnaire, recruitment, stages
+from galley.files.reading import FileModel
+from galley.study.written import factors, items, languages, questionnaire, recruitment, stages
+from galley.study.written import study_file as config
 from tests.study.workspaces import ROOT
 
 PAGE = ROOT / "docs" / "study-files.md"

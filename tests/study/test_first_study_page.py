@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 
-from galley.study import config, texts
+from galley.study.written import study_file as config
+from galley.study.written import texts
 from tests.study.workspaces import ROOT
 
 PAGE = (ROOT / "docs" / "first-study.md").read_text(encoding="utf-8")

@@ -6,7 +6,7 @@ from typing import get_args
 
 import pytest
 
-from galley.files import FileModel
+from galley.files.reading import FileModel
 from tests.study.reference import COMMON, ITEMS, MODELS, PAGE, STAGES, page
 
 TEXT = PAGE.read_text(encoding="utf-8")

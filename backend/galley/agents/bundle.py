@@ -15,7 +15,7 @@ from galley.agents.network import Network, NetworkAgent, Sampling
 from galley.agents.protocol import Agent
 from galley.agents.scripted import Random, Stay
 from galley.errors import GalleyError, InvalidFiles, Problem
-from galley.files import FileModel, Loaded, load
+from galley.files.reading import FileModel, Loaded, load
 from galley.kitchen import ENCODINGS, Encoder, Layout
 from galley.names import name_fix
 from galley.planning.centralized import Centralized

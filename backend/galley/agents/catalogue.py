@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from galley.agents.admission.trial import trial
 from galley.agents.bundle import Bundle, load_bundle
-from galley.agents.trial import trial
 from galley.errors import InvalidFiles, Problem
 from galley.kitchen import Layout
 from galley.kitchen.layout_file import load_layout

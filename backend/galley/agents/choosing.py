@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from galley.planning.compiling import kernel
-from galley.planning.draw_kernel import draw
+from galley.compiled.draw_kernel import draw
+from galley.compiled.kernels import kernel
 
 
 def choose(
@@ -33,7 +33,7 @@ def choose(
 def draws_for(
     seeds: NDArray[np.uint64], seats: NDArray[np.int64], ticks: NDArray[np.int64]
 ) -> NDArray[np.float64]:
-    """What `galley.randomness.uniform` gives for each row, float64 [B], in a fraction of its time."""
+    """What `randomness.uniform` gives for each row, float64 [B], in a fraction of its time."""
     draws = np.empty(len(seeds), dtype=np.float64)
     _draw(seeds, seats, ticks, draws)
     return draws

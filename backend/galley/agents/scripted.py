@@ -5,8 +5,8 @@ from __future__ import annotations
 from numpy import int16
 from numpy.typing import NDArray
 
+from galley.compiled.randomness import uniform
 from galley.kitchen import ACTIONS, STAY, Layout
-from galley.randomness import uniform
 
 
 class Stay:

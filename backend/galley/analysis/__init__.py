@@ -1,1 +1,1 @@
-"""What it means: teams evaluated on kitchens by the measures of their trials."""
+"""What it means (extra `report`): from the sheets of a study to its results."""

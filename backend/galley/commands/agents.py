@@ -17,7 +17,7 @@ from galley.commands.options import JsonOption, WorkspaceOption
 from galley.errors import GalleyError, InvalidFiles, Problem
 
 if TYPE_CHECKING:
-    from galley.agents.adding import Converted
+    from galley.agents.admission.adding import Converted
 
 app = typer.Typer(help="Agents: list, check, play, add.", no_args_is_help=True)
 
@@ -143,7 +143,7 @@ def add(
     json_: JsonOption = False,
 ) -> None:
     """Let a network in as an agent if it passes the gate; else tell every reason and leave all as it was."""
-    from galley.agents.adding import Newcomer, add_network
+    from galley.agents.admission.adding import Newcomer, add_network
     from galley.workspace import Workspace
 
     if (from_ is Origin.state_dict) != (network is not None):
@@ -207,17 +207,17 @@ def _files_by_layout(files: Sequence[Path], layouts: Sequence[str]) -> dict[str,
 def _converted(path: Path, shape: tuple[int, ...], origin: Origin, network: str | None) -> Converted:
     """The network of a file as ONNX; what changes files is imported only if one must be changed."""
     if origin is Origin.onnx:
-        from galley.agents.adding import as_it_is
+        from galley.agents.admission.adding import as_it_is
 
         try:
             return as_it_is(path, shape)
         except GalleyError as error:
             _need(["onnx"], f"{error}; what can be mended is mended with the package onnx")
-        from galley.learning.export_onnx import conform
+        from galley.learning.bundles.onnx_adapting import conform
 
         return conform(path, shape)
     _need(["torch", "onnx"], f"adding from {origin.value} needs PyTorch")
-    from galley.learning.export_torch import from_state_dict, from_torchscript
+    from galley.learning.bundles.torch_files import from_state_dict, from_torchscript
 
     if network is None:
         return from_torchscript(path, shape)

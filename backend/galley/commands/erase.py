@@ -21,8 +21,8 @@ def erase(
     Exports of all others stay as they were. A server that is running keeps its SQLite file to itself: erase
     on its researcher's pages then.
     """
-    from galley.records.erase import erase_participant
-    from galley.records.store import Store
+    from galley.records.store.erase import erase_participant
+    from galley.records.store.store import Store
     from galley.workspace import Workspace
 
     if not yes:

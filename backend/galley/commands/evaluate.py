@@ -38,8 +38,8 @@ def evaluate(
     json_: JsonOption = False,
 ) -> None:
     """Let a robot and a simulated human cook many times; print the median and spread of each measure."""
-    from galley.analysis.evaluate import Team
-    from galley.analysis.workers import evaluate_many
+    from galley.evaluation.many_layouts import evaluate_many
+    from galley.evaluation.teams import Team
     from galley.kitchen.layout_file import find_layout, load_layout
     from galley.workspace import Workspace
 

@@ -37,9 +37,9 @@ def export(
     database: DatabaseOption = None,
 ) -> None:
     """Write participants, rounds, ticks, responses and events as CSV, with their data dictionary."""
-    from galley.records.export import export_study
-    from galley.records.store import Store
-    from galley.records.trajectories import export_human_data, export_trajectories
+    from galley.records.export.study_export import export_study
+    from galley.records.export.trajectory_export import export_human_data, export_trajectories
+    from galley.records.store.store import Store
     from galley.workspace import Workspace
 
     with Store.open(database or Workspace(workspace).database, must_exist=True) as store:

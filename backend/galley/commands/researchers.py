@@ -21,9 +21,9 @@ def add(name: NameArgument, workspace: WorkspaceOption = Path(), database: Datab
 
     The password is asked for; when standard input is no terminal, its first line is the password.
     """
-    from galley.records.researchers import Researchers
-    from galley.records.store import Store
-    from galley.server.admin.passwords import Passwords, checked_name
+    from galley.records.store.researcher_accounts import Researchers
+    from galley.records.store.store import Store
+    from galley.server.researcher.passwords import Passwords, checked_name
     from galley.workspace import Workspace
 
     kept = checked_name(name)
@@ -42,8 +42,8 @@ def add(name: NameArgument, workspace: WorkspaceOption = Path(), database: Datab
 @app.command("list")
 def list_(workspace: WorkspaceOption = Path(), database: DatabaseOption = None) -> None:
     """Print the names of all researchers, one a line."""
-    from galley.records.researchers import Researchers
-    from galley.records.store import Store
+    from galley.records.store.researcher_accounts import Researchers
+    from galley.records.store.store import Store
     from galley.workspace import Workspace
 
     with Store.open(database or Workspace(workspace).database, must_exist=True) as store:
@@ -56,8 +56,8 @@ def remove(name: NameArgument, workspace: WorkspaceOption = Path(), database: Da
     """Remove a researcher and end their logins; what they did stays."""
     from galley.errors import GalleyError
     from galley.names import name_fix
-    from galley.records.researchers import Researchers
-    from galley.records.store import Store
+    from galley.records.store.researcher_accounts import Researchers
+    from galley.records.store.store import Store
     from galley.workspace import Workspace
 
     with Store.open(database or Workspace(workspace).database, must_exist=True) as store:

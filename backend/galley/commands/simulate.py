@@ -35,7 +35,7 @@ def simulate(
     json_: JsonOption = False,
 ) -> None:
     """Let simulated participants walk through a study; print how it went. Exits with 1 when a visit broke."""
-    from galley.simulate.figures import in_words
+    from galley.simulate.results import in_words
     from galley.simulate.simulation import Simulation
     from galley.simulate.simulation import simulate as run
     from galley.workspace import Workspace

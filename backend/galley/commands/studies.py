@@ -38,7 +38,7 @@ def schema(
     ] = Path("schemas"),
 ) -> None:
     """Write the JSON Schema of every kind of YAML file, for editors that complete and check them."""
-    from galley.study.schema import write_schemas
+    from galley.study.written.schema import write_schemas
 
     for path in write_schemas(out):
         typer.echo(path)

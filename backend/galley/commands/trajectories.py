@@ -29,7 +29,7 @@ def import_files(
         _import_study(studies, json_)
     if not pickles:
         return
-    from galley.kitchen.human_data import import_files as read
+    from galley.datasets.overcooked_games import import_files as read
 
     report = read(pickles)
     figures = {
@@ -44,7 +44,7 @@ def import_files(
 
 
 def _import_study(files: list[Path], json_: bool) -> None:
-    from galley.kitchen.lsi_study import import_study
+    from galley.datasets.lsi_study import import_study
 
     games = import_study(files)
     different = 0
@@ -69,8 +69,8 @@ def verify(
     database: DatabaseOption = None,
 ) -> None:
     """Replay every stored round of a study and compare it bit for bit with what was stored."""
-    from galley.records.store import Store
-    from galley.records.verify import verify_study
+    from galley.records.reading.verify import verify_study
+    from galley.records.store.store import Store
     from galley.workspace import Workspace
 
     store = Store.open(database or Workspace(workspace).database, must_exist=True)
@@ -125,8 +125,8 @@ def draw(
     if source is not None:
         filmed = footage([read(source)], str(source))
     else:
-        from galley.records.films import footage_of_round
-        from galley.records.store import Store
+        from galley.records.reading.films import footage_of_round
+        from galley.records.store.store import Store
 
         with Store.open(database or Workspace(workspace).database, must_exist=True) as store:
             filmed = footage_of_round(store, round_ or 0)

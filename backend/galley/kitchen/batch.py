@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from galley.kitchen import rules
 from galley.kitchen.codes import (
     BIT_FETCH,
     BIT_POT,
@@ -17,6 +16,7 @@ from galley.kitchen.codes import (
     TICK,
 )
 from galley.kitchen.layout import Layout
+from galley.kitchen.rules import classic as rules
 from galley.kitchen.state import state_size
 
 SHAPING_POTTING = 3.0

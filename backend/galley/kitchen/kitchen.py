@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from galley.kitchen import rules
 from galley.kitchen.codes import ACTIONS, DELIVERIES, TICK
 from galley.kitchen.events import Event, decode
 from galley.kitchen.layout import Layout
+from galley.kitchen.rules import classic as rules
 from galley.kitchen.state import KitchenView, state_size, view
 
 

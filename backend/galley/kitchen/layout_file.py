@@ -8,7 +8,7 @@ from typing import Literal
 from pydantic import Field
 
 from galley.errors import GalleyError, InvalidFiles, Problem
-from galley.files import FileModel, Loaded, load
+from galley.files.reading import FileModel, Loaded, load
 from galley.kitchen.codes import DISH_DISPENSER, ONION_DISPENSER, POT, SERVING, TOMATO_DISPENSER
 from galley.kitchen.layout import Layout, Rules, grid_problems
 from galley.kitchen.reach import reachable_stations

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from galley.errors import GalleyError
 from galley.kitchen import observation_kernels as kernels
+from galley.kitchen.action_costs import action_costs
 from galley.kitchen.codes import (
     COUNTER,
     DISH_DISPENSER,
@@ -17,7 +18,6 @@ from galley.kitchen.codes import (
     SERVING,
     TOMATO_DISPENSER,
 )
-from galley.kitchen.distances import action_costs
 from galley.kitchen.layout import Layout
 
 ENCODINGS: Final[dict[str, str]] = {

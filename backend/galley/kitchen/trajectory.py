@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from galley.errors import GalleyError
-from galley.kitchen import rules
 from galley.kitchen.codes import ACTIONS
 from galley.kitchen.events import Event, decode
 from galley.kitchen.layout import Layout
+from galley.kitchen.rules import classic as rules
 from galley.kitchen.state import state_problem, state_size
 
 FORMAT: Final = 1

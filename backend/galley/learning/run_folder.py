@@ -12,11 +12,11 @@ import torch
 from torch.utils.tensorboard import SummaryWriter
 
 from galley.errors import GalleyError
+from galley.files.whole_file import whole_file
 from galley.kitchen import Layout
-from galley.learning.origin import ORIGIN, origin
-from galley.learning.policy import Policy
-from galley.learning.whole_file import whole_file
+from galley.learning.ppo.policy import Policy
 from galley.names import name_fix
+from galley.runs.provenance import ORIGIN, origin
 
 COLUMNS: Final = (
     "ticks",

@@ -9,11 +9,11 @@ import numpy as np
 import torch
 
 from galley.errors import GalleyError
+from galley.evaluation.game_graph import PayoffTable
 from galley.kitchen.layout_file import find_layout
-from galley.learning.forwards import Machine
-from galley.learning.graph import PayoffTable
-from galley.learning.payoffs import games_among
-from galley.learning.populations.milestones import CHECKPOINTS
+from galley.learning.methods.milestones import CHECKPOINTS
+from galley.learning.ppo.forwards import Machine
+from galley.learning.ppo.games import games_among
 from galley.learning.run_folder import load_policy, run_asked
 from galley.workspace import Workspace
 

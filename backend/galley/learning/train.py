@@ -12,8 +12,8 @@ from tqdm import tqdm
 
 from galley.errors import GalleyError
 from galley.kitchen import Layout
-from galley.learning.methods import Asked, described, machine_of, make
-from galley.learning.policy import Policy
+from galley.learning.asked import Asked, described, machine_of, make
+from galley.learning.ppo.policy import Policy
 from galley.learning.process import prepare_process
 from galley.learning.run_folder import RunFolder
 from galley.learning.training import run

@@ -8,10 +8,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from galley.learning.learner import Learner
-from galley.learning.policy import Policy
-from galley.learning.ppo import UpdateFigures
-from galley.learning.rollout import Rollout
+from galley.learning.ppo.learner import Learner
+from galley.learning.ppo.policy import Policy
+from galley.learning.ppo.rollout import Rollout
+from galley.learning.ppo.update import UpdateFigures
 from galley.learning.run_folder import RunFolder
 
 

@@ -18,9 +18,8 @@ from galley.kitchen.codes import (
 from galley.kitchen.layout import Layout
 from galley.planning.distances import Distances, distances
 from galley.planning.joint_motion import joint_tables
-from galley.planning.robot_kernel import Brain
-from galley.planning.solvable import require_solvable
-from galley.planning.value_kernel import (
+from galley.planning.kernels.robot_kernel import Brain
+from galley.planning.kernels.value_kernel import (
     AT_POT,
     AT_SERVING,
     FETCH_SOUP,
@@ -40,6 +39,7 @@ from galley.planning.value_kernel import (
     WORLDS,
     iterate,
 )
+from galley.planning.solvable import require_solvable
 
 _STATIONS = {
     TAKE_INGREDIENT: (ONION_DISPENSER, TOMATO_DISPENSER),

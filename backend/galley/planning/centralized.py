@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from galley.errors import GalleyError
 from galley.kitchen.codes import CELLS, CHEF, DELIVERIES, HELD, POT_TICKS, STAY
 from galley.kitchen.layout import Layout
-from galley.kitchen.rules import step
+from galley.kitchen.rules.classic import step
 from galley.kitchen.trajectory import start
 from galley.planning.robots import QMDP
 from galley.planning.team import TeamPlan, TeamPlanner, TeamSearch

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from galley.errors import GalleyError
+from galley.kitchen.action_costs import UNREACHABLE, action_costs
 from galley.kitchen.codes import FLOOR
-from galley.kitchen.distances import UNREACHABLE, action_costs
 from galley.kitchen.layout import Layout
 
 MOST_CELLS = 1600

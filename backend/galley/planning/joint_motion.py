@@ -11,7 +11,7 @@ from galley.errors import GalleyError
 from galley.kitchen.codes import FLOOR, STAY
 from galley.kitchen.layout import Layout, Place
 from galley.planning.distances import Distances, distances
-from galley.planning.joint_kernel import (
+from galley.planning.kernels.joint_kernel import (
     FAR,
     FREE,
     MOST_POSES,
@@ -47,7 +47,7 @@ class JointMotion:
     """Exact joint plans on one layout: fewest ticks until both chefs are where they should be, at once.
 
     A chef moves or stays; interacting moves nobody, so it counts as staying. The movement rules are those
-    of `galley.kitchen.rules`: who would meet on a cell or swap cells stays, and turns all the same.
+    of `galley.kitchen.rules.classic`: who would meet on a cell or swap cells stays, and turns all the same.
     Costs are kept in tables that fill as they are asked for.
 
     Raises:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from galley.compiled.randomness import uniform
 from galley.kitchen import ACTIONS, Layout
 from galley.kitchen.codes import TICK
 from galley.planning.distances import distances
-from galley.planning.myopic_kernel import MEMORY_SIZE, decide, remember
-from galley.randomness import uniform
+from galley.planning.kernels.myopic_kernel import MEMORY_SIZE, decide, remember
 
 UNSTUCK, NOISE, NOISY_ACTION, LENGTH = range(4)
 """Streams of random numbers."""

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from galley.compiled.randomness import uniform
 from galley.errors import GalleyError
 from galley.kitchen.layout import Layout
 from galley.planning.brain import brain
-from galley.planning.robot_kernel import ROBOT_MEMORY, Brain, robot_action, robot_observe
-from galley.planning.subtask_kernel import KINDS
+from galley.planning.kernels.robot_kernel import ROBOT_MEMORY, Brain, robot_action, robot_observe
+from galley.planning.kernels.subtask_kernel import KINDS
 from galley.planning.subtasks import SUBTASKS
-from galley.randomness import uniform
 
 
 class _Robot:

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from galley.kitchen.layout import Place
 from galley.planning.distances import Distances
-from galley.planning.myopic_kernel import target
-from galley.planning.subtask_kernel import KINDS, WAIT, kind_of
-from galley.planning.subtask_kernel import subtasks as _fill
+from galley.planning.kernels.myopic_kernel import target
+from galley.planning.kernels.subtask_kernel import KINDS, WAIT, kind_of
+from galley.planning.kernels.subtask_kernel import subtasks as _fill
 
 
 @dataclass(frozen=True)

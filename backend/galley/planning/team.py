@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from galley.errors import GalleyError
 from galley.kitchen.codes import DELIVERIES, ORDERS_DELIVERED
 from galley.kitchen.layout import Layout
-from galley.kitchen.rules import step
+from galley.kitchen.rules.classic import step
 from galley.planning.brain import brain
-from galley.planning.robot_kernel import Brain
-from galley.planning.team_kernel import (
+from galley.planning.kernels.robot_kernel import Brain
+from galley.planning.kernels.team_kernel import (
     BEST_END,
     BEST_NODE,
     LEG_TICKS,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from galley.kitchen.layout import Layout
 from galley.planning.brain import brain
-from galley.planning.trial_kernel import MDP, MYOPIC, NOISE, NOISY_ACTION, QMDP, run_trials
+from galley.planning.kernels.trial_kernel import MDP, MYOPIC, NOISE, NOISY_ACTION, QMDP, run_trials
 
 __all__ = ["NOISE", "NOISY_ACTION", "ROBOTS", "Trials", "run"]
 

@@ -1,6 +1,6 @@
 """What did happen: visits, answers and rounds in one database, and the ways to write, read and check them."""
 
-from galley.records.leases import Lease, LeaseLost
+from galley.records.database.leases import Lease, LeaseLost
 from galley.records.rows import (
     Arrival,
     Begun,
@@ -17,7 +17,7 @@ from galley.records.rows import (
     TickRow,
     VisitRow,
 )
-from galley.records.store import Store
+from galley.records.store.store import Store
 
 __all__ = [
     "Arrival",

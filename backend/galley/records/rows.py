@@ -12,7 +12,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from galley.study.assignment import Slot
+from galley.study.visit.condition_slots import Slot
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,22 +20,22 @@ from galley.errors import GalleyError
 from galley.kitchen import STAY, Kitchen, Layout, warm
 from galley.kitchen.layout_file import load_layouts
 from galley.records import Store
-from galley.server.admin.pages import researcher_pages
 from galley.server.clock import Clock
-from galley.server.collecting import collect_between_rounds, few_collections
-from galley.server.lobby import Lobby
-from galley.server.matches import Matches
-from galley.server.origin import HEADERS, SecureHeaders
-from galley.server.pages import NO_PAGE, NOT_FOUND, Pages, templates
-from galley.server.play import Play
-from galley.server.setting_up import round_layout
+from galley.server.garbage_collection import collect_between_rounds, few_collections
+from galley.server.headers import HEADERS, SecureHeaders
+from galley.server.participant.pages import NO_PAGE, NOT_FOUND, Pages, templates
+from galley.server.participant.time_limits import TimeLimits
+from galley.server.participant.visits import Visits
+from galley.server.researcher.routes import researcher_pages
+from galley.server.rounds.lobby import Lobby
+from galley.server.rounds.matches import Matches
+from galley.server.rounds.play_socket import Play
+from galley.server.rounds.set_up import round_layout
+from galley.server.rounds.thinking import Thinking
 from galley.server.settings import Settings
-from galley.server.thinking import Thinking
-from galley.server.time_limits import TimeLimits
-from galley.server.visits import Visits
-from galley.study.assignment import cells
-from galley.study.plan import plan_visit, visit_seed
 from galley.study.study import Study, load_study
+from galley.study.visit.condition_slots import cells
+from galley.study.visit.plan import plan_visit, visit_seed
 from galley.translations import Catalogues, mark
 from galley.workspace import Workspace, frontend_folder
 

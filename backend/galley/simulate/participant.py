@@ -14,10 +14,10 @@ from urllib.parse import urlencode
 import httpx
 
 from galley.kitchen import Layout
-from galley.simulate.answers import Known, fill
-from galley.simulate.figures import Figures
+from galley.simulate.form_filling import Known, fill
 from galley.simulate.page import Form, Page, read_page
 from galley.simulate.playing import Player, RoundLost
+from galley.simulate.results import Figures
 from galley.simulate.seen import MakeAgent
 
 MAX_PAGES: Final = 500

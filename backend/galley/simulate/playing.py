@@ -16,7 +16,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from galley.kitchen import Layout
-from galley.simulate.figures import Figures
+from galley.simulate.results import Figures
 from galley.simulate.seen import MakeAgent, Seen
 
 CLOSE_REPLACED: Final = 4001

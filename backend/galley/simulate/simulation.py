@@ -26,8 +26,8 @@ from galley.errors import GalleyError
 from galley.kitchen import Layout
 from galley.kitchen.layout_file import load_layouts
 from galley.simulate.delay import delayed
-from galley.simulate.figures import Figures
 from galley.simulate.participant import Participant, World, known_answers
+from galley.simulate.results import Figures
 from galley.study.study import Study, load_study
 from galley.workspace import Workspace
 

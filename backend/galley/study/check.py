@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 from galley.errors import InvalidFiles, Problem
 from galley.study.describe import describe
-from galley.study.questionnaire import load_questionnaire
-from galley.study.recruitment import load_invitations
 from galley.study.study import known_layouts_of, load_study
-from galley.study.texts import load_text
+from galley.study.written.questionnaire import load_questionnaire
+from galley.study.written.recruitment import load_invitations
+from galley.study.written.texts import load_text
 from galley.workspace import KINDS, NAME, Workspace
 
 __all__ = ["check_workspace", "describe"]

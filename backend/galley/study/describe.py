@@ -6,12 +6,13 @@ import math
 from collections.abc import Iterator
 from typing import Final
 
-from galley.study.assignment import capacity, cells
-from galley.study.counterbalance import latin_square, permutations_count
 from galley.study.estimate import round_s
-from galley.study.factors import Condition
-from galley.study.recruitment import VISIT_OUTCOMES
-from galley.study.stages import (
+from galley.study.study import Study
+from galley.study.visit.condition_slots import capacity, cells
+from galley.study.visit.counterbalance import latin_square, permutations_count
+from galley.study.written.factors import Condition
+from galley.study.written.recruitment import VISIT_OUTCOMES
+from galley.study.written.stages import (
     ALONE,
     HUMAN,
     Break,
@@ -29,7 +30,6 @@ from galley.study.stages import (
     conditions_of,
     stage_ids,
 )
-from galley.study.study import Study
 
 _SEATS: Final = {"per_layout": "for each layout", "per_round": "for each round"}
 _ORDERS: Final = {

@@ -6,10 +6,9 @@ import math
 from collections.abc import Mapping
 from typing import Final
 
-from galley.study.config import StudyFile
-from galley.study.factors import levels_of
-from galley.study.questionnaire import Questionnaire
-from galley.study.stages import (
+from galley.study.written.factors import levels_of
+from galley.study.written.questionnaire import Questionnaire
+from galley.study.written.stages import (
     Break,
     Comparison,
     Consent,
@@ -22,6 +21,7 @@ from galley.study.stages import (
     Stage,
     Tutorial,
 )
+from galley.study.written.study_file import StudyFile
 
 TEXT_S: Final = {"consent": 60, "instructions": 90, "debrief": 20, "break": 60}
 ITEM_S: Final = 6

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from galley.study.items import Comparison, Likert, SemanticDifferential, Slider
-from galley.study.questionnaire import Answer, Questionnaire, failed_checks
+from galley.study.written.items import Comparison, Likert, SemanticDifferential, Slider
+from galley.study.written.questionnaire import Answer, Questionnaire, failed_checks
 
 
 def signed_preference(item: Comparison, answer: Answer) -> float | None:

@@ -6,16 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from galley.errors import InvalidFiles, Problem
-from galley.files import Loaded, load
+from galley.files.reading import Loaded, load
 from galley.kitchen import Layout
-from galley.study.config import StudyFile, names_of
-from galley.study.crosscheck import agent_problems, kitchen_problems, questionnaire_problems
 from galley.study.estimate import estimated_minutes, text_values
-from galley.study.named_files import content_sha256, known_layouts_of, text_file
-from galley.study.questionnaire import Questionnaire, load_questionnaire
-from galley.study.recruitment import Ending, Outcome, filled, kept, load_invitations
-from galley.study.steps import Step
-from galley.study.texts import PageText, load_text
+from galley.study.visit.steps import Step
+from galley.study.written.crosscheck import agent_problems, kitchen_problems, questionnaire_problems
+from galley.study.written.named_files import content_sha256, known_layouts_of, text_file
+from galley.study.written.questionnaire import Questionnaire, load_questionnaire
+from galley.study.written.recruitment import Ending, Outcome, filled, kept, load_invitations
+from galley.study.written.study_file import StudyFile, names_of
+from galley.study.written.texts import PageText, load_text
 from galley.workspace import Kind, Workspace
 
 __all__ = ["Study", "estimated_minutes", "known_layouts_of", "load_study"]

@@ -15,15 +15,15 @@ from typer.testing import CliRunner, Result
 
 from galley.cli import app
 from galley.errors import GalleyError
-from galley.learning.evaluation.entries import Entry
-from galley.learning.evaluation.results import Cell, Results
-from galley.learning.graph import PayoffTable, centrality_matrix
+from galley.evaluation.entries import Entry
+from galley.evaluation.game_graph import PayoffTable, centrality_matrix
+from galley.evaluation.results import Cell, Results
 from galley.learning.plots.bars import draw_bars
 from galley.learning.plots.curves import draw_curves, read_curve, smoothed
 from galley.learning.plots.graphs import draw_graphs, spread
 from galley.learning.plots.matrices import draw_matrices
 from galley.learning.plots.sources import read_payoffs
-from galley.learning.plots.style import COLOURS, DARK_GREY, GREY, save, titled
+from galley.plot_style import COLOURS, DARK_GREY, GREY, save, titled
 
 A, B, P = (Entry(name, (name,)) for name in ("a", "b", "p"))
 SCORES = {

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from galley.learning.evaluation.entries import Entry, with_partner
-from galley.learning.evaluation.results import Results
-from galley.learning.plots.style import COLOURS, DARK_GREY, GREY, new_figure, styled, titled
+from galley.evaluation.entries import Entry, with_partner
+from galley.evaluation.results import Results
+from galley.plot_style import COLOURS, DARK_GREY, GREY, new_figure, styled, titled
 
 HATCH = "//////"
 GROUP = 0.84

@@ -14,9 +14,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from galley.errors import GalleyError
-from galley.learning.evaluation.entries import Entry
-from galley.learning.plots.style import COLOURS, LINES, new_figure, styled
+from galley.evaluation.entries import Entry
 from galley.names import name_fix
+from galley.plot_style import COLOURS, LINES, new_figure, styled
 
 LOG: Final = "log.csv"
 POINTS: Final = 400

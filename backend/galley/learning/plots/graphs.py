@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from galley.errors import GalleyError
-from galley.learning.graph import PayoffTable, preference_centrality, preference_edges
-from galley.learning.plots.style import new_figure, styled
+from galley.evaluation.game_graph import PayoffTable, preference_centrality, preference_edges
+from galley.plot_style import new_figure, styled
 
 LABELLED = 6
 """Up to as many strategies have their payoffs written on the edges of the game graph."""

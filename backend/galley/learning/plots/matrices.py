@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from galley.learning.graph import PayoffTable, centrality_matrix, newest_centralities
-from galley.learning.plots.style import new_figure, styled
+from galley.evaluation.game_graph import PayoffTable, centrality_matrix, newest_centralities
+from galley.plot_style import new_figure, styled
 
 NAMED = 12
 """Up to as many strategies are named on the axes; of more, every some number."""

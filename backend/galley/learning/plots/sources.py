@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from galley.errors import GalleyError
-from galley.learning.evaluation.results import Results
-from galley.learning.graph import PayoffTable
+from galley.evaluation.game_graph import PayoffTable
+from galley.evaluation.results import Results
 
 
 def read_payoffs(path: Path, layout: str | None = None, agents: Sequence[str] = ()) -> PayoffTable:

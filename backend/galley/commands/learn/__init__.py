@@ -1,0 +1,1 @@
+"""`galley learn`: agents made from data (needs the extra `learn`)."""

@@ -1,0 +1,1 @@
+"""One way to compile a kernel, one way to draw a random number."""

@@ -1,0 +1,1 @@
+"""How well agents cook together: teams, cross-play, tables and the game graph. No PyTorch."""

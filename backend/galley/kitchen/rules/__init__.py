@@ -1,0 +1,1 @@
+"""The rules of a tick, one module a rule set."""

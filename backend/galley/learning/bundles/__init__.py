@@ -1,0 +1,1 @@
+"""From trained networks to agent bundles: ONNX files and cards."""

@@ -1,0 +1,1 @@
+"""Behaviour cloning: networks that predict what people did, and their bundles."""

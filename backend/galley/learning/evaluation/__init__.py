@@ -1,1 +1,0 @@
-"""How well agents cook with each other and with strangers: bundles played, kept, put into tables."""

@@ -1,0 +1,1 @@
+"""Proximal policy optimisation: the policy network, rollouts and one update."""

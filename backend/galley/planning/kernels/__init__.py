@@ -1,0 +1,1 @@
+"""The compiled halves of the planners: searches, estimates and decisions on plain arrays."""

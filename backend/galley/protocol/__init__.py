@@ -1,0 +1,1 @@
+"""What travels between browser and round: messages, scenes and keyframes."""

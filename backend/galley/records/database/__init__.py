@@ -1,0 +1,1 @@
+"""The database itself: tables, connections, migrations, leases and the thread that writes."""

@@ -1,0 +1,1 @@
+"""Records as files: sheets, their formats and the data dictionary."""

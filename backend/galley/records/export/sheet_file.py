@@ -1,0 +1,40 @@
+"""A file of an export that appears under its name only when it is whole."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, ClassVar, Self
+
+from galley.records.export.sheets import Sheet
+
+
+class PartFile(ABC):
+    """Written under another name first, so that a run that fails leaves no half of a file behind."""
+
+    ending: ClassVar[str]
+
+    def __init__(self, folder: Path, sheet: Sheet) -> None:
+        self.sheet = sheet
+        self.rows = 0
+        self.path = folder / f"{sheet.name}.{self.ending}"
+        self.part = folder / f".{self.path.name}.part"
+
+    @abstractmethod
+    def write(self, values: Mapping[str, Any]) -> None:
+        """Add a row: a value, or None, for every column. Raises KeyError for a column left out."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Nothing more is written."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        self.close()
+        if kind is None:
+            self.part.replace(self.path)
+        else:
+            self.part.unlink(missing_ok=True)

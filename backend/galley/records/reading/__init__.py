@@ -1,0 +1,1 @@
+"""What happened, read again: overviews, flags, timelines, replays and their verification."""

@@ -1,0 +1,88 @@
+"""Visits whose data a researcher should look at before using it, found by counting."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Final
+
+from sqlalchemy import ColumnElement, Connection, Select, func, select
+
+from galley.records.database.tables import ABSENCES, RESPONSES, ROUNDS, SEATS, VISITS
+
+# From here on a partner that stands still now and then may be felt.
+LATE_SHARE: Final = 0.01
+HIDDEN_S: Final = 60.0
+# Two ticks of 150 ms: what the person sees is that much behind what the kitchen does.
+SLOW_RTT_MS: Final = 300.0
+
+FLAGS: Final = {
+    "late_agent": "the agent was late or at fault in more than 1% of the ticks played",
+    "hidden_tab": "the page was hidden for more than a minute in all",
+    "failed_checks": "an attention check was not answered as expected",
+    "slow_client": "in some round, half of all round trips took more than 300 ms",
+}
+"""Every kind of flag and what it means."""
+
+
+@dataclass(frozen=True, slots=True)
+class Flag:
+    """Something about a visit that stands out: a kind of FLAGS, its number, and both in words."""
+
+    kind: str
+    value: float
+    words: str
+
+
+def flags(
+    connection: Connection, study: str, visit_id: int | None = None, *, tests: bool = True
+) -> dict[int, tuple[Flag, ...]]:
+    """The flags of every visit of a study that has any, or of one visit; `tests` says whether of tests."""
+    these = (VISITS.c.study == study) if visit_id is None else (VISITS.c.id == visit_id)
+    if not tests:
+        these = these & ~VISITS.c.test
+    found: dict[int, list[Flag]] = defaultdict(list)
+    for rule in (_late, _hidden, _failed, _slow):
+        for visit, flag in rule(connection, these):
+            found[visit].append(flag)
+    return {visit: tuple(of_visit) for visit, of_visit in sorted(found.items())}
+
+
+Found = Iterator[tuple[int, Flag]]
+
+
+def _of(these: ColumnElement[bool], table: Any, *columns: Any) -> Select[Any]:
+    return select(VISITS.c.id, *columns).join(table, table.c.visit_id == VISITS.c.id).where(these)
+
+
+def _late(connection: Connection, these: ColumnElement[bool]) -> Found:
+    bad, played = func.sum(ROUNDS.c.late_ticks + ROUNDS.c.fault_ticks), func.sum(ROUNDS.c.played_ticks)
+    query = _of(these, SEATS, bad, played).join(ROUNDS, ROUNDS.c.id == SEATS.c.round_id)
+    for visit, late, ticks in connection.execute(query.group_by(VISITS.c.id)):
+        if late and late / ticks > LATE_SHARE:
+            yield visit, Flag("late_agent", float(late / ticks), f"{late} of {ticks} ticks of the agent late")
+
+
+def _hidden(connection: Connection, these: ColumnElement[bool]) -> Found:
+    query = _of(these, ABSENCES, func.sum(ABSENCES.c.ended_ms - ABSENCES.c.started_ms), func.count())
+    for visit, hidden_ms, times in connection.execute(query.group_by(VISITS.c.id)):
+        seconds = float(hidden_ms or 0) / 1000
+        if seconds > HIDDEN_S:
+            yield visit, Flag("hidden_tab", seconds, f"hidden for {seconds:.0f} s, {times} times")
+
+
+def _failed(connection: Connection, these: ColumnElement[bool]) -> Found:
+    query = _of(these, RESPONSES, func.count()).where(RESPONSES.c.passed.is_(False))
+    for visit, count in connection.execute(query.group_by(VISITS.c.id)):
+        yield (
+            visit,
+            Flag("failed_checks", float(count), f"{count} checks failed" if count > 1 else "1 check failed"),
+        )
+
+
+def _slow(connection: Connection, these: ColumnElement[bool]) -> Found:
+    query = _of(these, SEATS, func.max(SEATS.c.rtt_median_ms)).group_by(VISITS.c.id)
+    for visit, rtt_ms in connection.execute(query):
+        if rtt_ms is not None and rtt_ms > SLOW_RTT_MS:
+            yield visit, Flag("slow_client", float(rtt_ms), f"round trips of {rtt_ms:.0f} ms")

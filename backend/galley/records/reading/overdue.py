@@ -1,0 +1,29 @@
+"""Visits that go on though their time has passed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from sqlalchemy import Connection, exists, or_, select
+
+from galley.records.database import leases
+from galley.records.database.tables import LEASES, ROUNDS, SEATS, VISITS
+
+
+def overdue_tokens(connection: Connection, begun_before: Mapping[str, float], owner: str) -> list[str]:
+    """The tokens of active visits that began before their study's time (ms), oldest first.
+
+    Left out are those who play a round that another process than `owner` has.
+    """
+    late = [(VISITS.c.study == study) & (VISITS.c.created_ms <= ms) for study, ms in begun_before.items()]
+    if not late:
+        return []
+    elsewhere = (
+        exists()
+        .where(SEATS.c.visit_id == VISITS.c.id)
+        .where(ROUNDS.c.id == SEATS.c.round_id, ROUNDS.c.status == "open")
+        .where(LEASES.c.round_id == ROUNDS.c.id, LEASES.c.owner.is_not(None), LEASES.c.owner != owner)
+        .where(LEASES.c.expires_ms > leases.now_ms(connection))
+    )
+    query = select(VISITS.c.token).where(VISITS.c.status == "active", or_(*late), ~elsewhere)
+    return list(connection.execute(query.order_by(VISITS.c.created_ms, VISITS.c.id)).scalars())

@@ -1,0 +1,1 @@
+"""What the server writes and reads while studies run: visits, rounds, pairs and researchers."""

@@ -1,0 +1,107 @@
+"""What every part of the store stands on: one writing thread, some reading ones, one database."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from typing import Literal, TypeVar
+
+from sqlalchemy import Connection, Engine
+
+from galley.files.serving_lock import ServingLock
+from galley.records.database.retries import Patience, passes
+from galley.records.database.writer import Writer
+from galley.records.rows import Health
+
+T = TypeVar("T")
+READERS = 2
+
+
+class StoreBase:
+    """An open database."""
+
+    def __init__(
+        self,
+        name: str,
+        engine: Engine,
+        reader: Engine,
+        lock: ServingLock | None,
+        flush_s: float,
+        patience_s: float,
+    ) -> None:
+        self.name = name
+        self._engine = engine
+        self._reader = reader
+        self._lock = lock
+        self._patience_s = patience_s
+        self._closing = threading.Event()
+        self._writer = Writer(engine, flush_s, patience_s)
+        self._readers = ThreadPoolExecutor(READERS, thread_name_prefix="galley-reader")
+
+    @property
+    def engine(self) -> Engine:
+        """For work that no transaction can hold, such as rewriting the file."""
+        return self._engine
+
+    def write(
+        self, work: Callable[[Connection], T], *, first: int | Literal["all"] | None = None
+    ) -> Future[T]:
+        """The result of `work` in a transaction of its own, given once that is committed.
+
+        `work` may be run again if the database went away, so doing it twice must be as good as once.
+        `first`: what waits in the journal, for one round or for all of them, is written before.
+        """
+        return self._writer.submit(work, first=first)
+
+    def read(self, query: Callable[[Connection], T]) -> Future[T]:
+        """The result of `query` on the database as it stands; tried again while that is away."""
+
+        def run(until_s: float = time.monotonic() + self._patience_s) -> T:
+            patience = Patience(self._reader, until_s, self._closing)
+            while True:
+                try:
+                    with self.reading() as connection:
+                        return query(connection)
+                except Exception as error:
+                    if passes(error) and patience.wait():
+                        continue
+                    raise patience.verdict(error) from None
+
+        return self._readers.submit(run)
+
+    @contextmanager
+    def reading(self) -> Iterator[Connection]:
+        """A connection that sees the database as it stands now, for as long as it is open."""
+        with self._reader.connect() as connection:
+            if connection.dialect.name == "postgresql":
+                connection = connection.execution_options(
+                    isolation_level="REPEATABLE READ", postgresql_readonly=True
+                )
+            with connection.begin():
+                yield connection
+
+    def flush(self) -> Future[None]:
+        """Done when everything journalled before this call is committed."""
+        return self._writer.flush()
+
+    def health(self) -> Health:
+        """Whether what is journalled reaches the database."""
+        return self._writer.health()
+
+    def close(self) -> None:
+        """Write what waits, then let go of the database; a second call does nothing.
+
+        Raises: GalleyError if journalled rows could not be written.
+        """
+        self._closing.set()
+        try:
+            self._writer.close()
+        finally:
+            self._readers.shutdown()
+            self._engine.dispose()
+            self._reader.dispose()
+            if self._lock is not None:
+                self._lock.release()

@@ -1,0 +1,199 @@
+"""The part of the store that is about visits: arrivals, answers, attempts, signs of life, notes."""
+
+from __future__ import annotations
+
+import base64
+import secrets
+from collections.abc import Mapping
+from concurrent.futures import Future
+from typing import Any
+
+from galley.records.database.tables import STUDY_STATES, VISIT_STATUSES
+from galley.records.rows import Arrival, Begun, VisitRow
+from galley.records.store import absences, arrivals, queries
+from galley.records.store import visit_writes as jobs
+from galley.records.store.arrivals import Allocate, Plan
+from galley.records.store.store_base import StoreBase
+from galley.study.written.questionnaire import Questionnaire
+
+
+def _names() -> dict[str, str]:
+    """A token that cannot be guessed, and a name for exports that has nothing to do with it."""
+    participant = "p" + base64.b32encode(secrets.token_bytes(10)).decode().lower()
+    return {"token": secrets.token_urlsafe(24), "participant": participant}
+
+
+class VisitStore(StoreBase):
+    """What is written and read about visits."""
+
+    def begin_visit(self, arrival: Arrival, plan: Plan, allocate: Allocate | None = None) -> Future[Begun]:
+        """What comes of an arrival: a visit at its first step, or why there is none.
+
+        In one transaction, in turns with arrivals at other servers: `allocate` picks one of the study's
+        slots, whose last visit expires if it was not over; `plan(visit_no, slot)` says what it will meet.
+        Both are called in the writer's thread. Without `allocate`, and for tests, no slot is taken.
+        """
+        names = _names()
+        return self.write(lambda connection: arrivals.begin(connection, arrival, names, plan, allocate))
+
+    def next_visit_no(self, study: str) -> Future[int]:
+        """A visit number of `study` that was never given out before, from 0."""
+        return self.write(lambda connection: jobs.next_visit_no(connection, study))
+
+    def create_visit(
+        self,
+        study: str,
+        study_sha256: str,
+        seed: int,
+        visit_no: int,
+        plan_json: str,
+        condition: Mapping[str, Any],
+        link_params: Mapping[str, str],
+        at_ms: float,
+    ) -> Future[VisitRow]:
+        """A new visit at its first step, outside every slot."""
+        values = {
+            **_names(),
+            "study": study,
+            "study_sha256": study_sha256,
+            "seed": str(seed),
+            "visit_no": visit_no,
+            "plan_json": plan_json,
+            "condition": dict(condition),
+            "link_params": dict(link_params),
+            "created_ms": round(at_ms),
+        }
+        return self.write(lambda connection: jobs.create_visit(connection, values))
+
+    def visit(self, token: str) -> Future[VisitRow | None]:
+        """The visit behind a link, None if there is none."""
+        return self.read(lambda connection: queries.visit(connection, token))
+
+    def answers(self, visit_id: int) -> Future[dict[str, dict[str, Any]]]:
+        """For each step of the visit that was answered, its answers by item."""
+        return self.read(lambda connection: queries.answers(connection, visit_id))
+
+    def enter_step(self, visit_id: int, step_id: str, at_ms: float) -> Future[None]:
+        """Note that a step's page was sent; the first time counts as entering it."""
+        return self.write(lambda connection: jobs.enter_step(connection, visit_id, step_id, round(at_ms)))
+
+    def save_answers(
+        self,
+        visit_id: int,
+        step_id: str,
+        answers: Mapping[str, Any],
+        new_step_index: int,
+        status: str,
+        at_ms: float,
+        completion_code: str | None = None,
+        questionnaire: Questionnaire | None = None,
+        consent_sha256: str | None = None,
+    ) -> Future[bool]:
+        """Store a step's answers and move the visit on, in one transaction.
+
+        `questionnaire` is the one that was answered; its items are kept as they were shown.
+        `consent_sha256` is the hash of the text that was agreed to. A status other than "active" ends the
+        visit and completes its slot, or leaves it to be given out again. False, and nothing changed, if the
+        step was left before (the same form sent twice counts once) or the visit is over.
+        """
+        shown = _shown(questionnaire)
+        rows = [
+            {
+                "position": position,
+                "item": item,
+                "value": value,
+                "shown": shown.get(item),
+                "passed": _passed(shown.get(item, {}), value),
+            }
+            for position, (item, value) in enumerate(answers.items(), 1)
+        ]
+        code = completion_code
+        left = jobs.Left(
+            visit_id, step_id, rows, new_step_index, _status(status), round(at_ms), code, consent_sha256
+        )
+        return self.write(lambda connection: jobs.leave_step(connection, left))
+
+    def save_attempt(
+        self,
+        visit_id: int,
+        step_id: str,
+        attempt: int,
+        answers: Mapping[str, Any],
+        at_ms: float,
+        questionnaire: Questionnaire | None = None,
+    ) -> Future[bool]:
+        """Keep failed attempt number `attempt` (from 1) at a quiz; the visit stays where it is."""
+        shown = _shown(questionnaire)
+        wrong = [item for item, value in answers.items() if _passed(shown.get(item, {}), value) is False]
+        values = {
+            "step_id": step_id,
+            "attempt": attempt,
+            "answers": dict(answers),
+            "wrong": wrong,
+            "at_ms": round(at_ms),
+        }
+        return self.write(lambda connection: jobs.save_attempt(connection, visit_id, values))
+
+    def end_visit(
+        self, visit_id: int, status: str, at_ms: float, completion_code: str | None = None
+    ) -> Future[bool]:
+        """End a visit at the step where it is; False if it was over."""
+        _status(status)
+        return self.write(
+            lambda connection: jobs.end_visit(connection, visit_id, status, round(at_ms), completion_code)
+        )
+
+    def seen(self, visit_id: int, at_ms: float) -> Future[None]:
+        """Note a sign of life; pages, answers, keys and pings count by themselves."""
+        return self.write(lambda connection: jobs.seen(connection, visit_id, round(at_ms)))
+
+    def hidden(
+        self, visit_id: int, step_id: str, started_ms: float, ended_ms: float | None = None
+    ) -> Future[None]:
+        """Note that a participant's page was hidden; once more with `ended_ms` when it is shown again."""
+        end = None if ended_ms is None else round(ended_ms)
+        return self.write(
+            lambda connection: jobs.hidden(connection, visit_id, step_id, round(started_ms), end)
+        )
+
+    def left_page(self, visit_id: int, step_id: str, at_ms: float) -> Future[None]:
+        """Note that the page of a step was hidden; the next page, or `back_on_page`, ends that."""
+        return self.write(lambda connection: absences.left_page(connection, visit_id, step_id, round(at_ms)))
+
+    def back_on_page(self, visit_id: int, at_ms: float) -> Future[None]:
+        """Note that a page is seen again."""
+        return self.write(lambda connection: absences.back_on_page(connection, visit_id, round(at_ms)))
+
+    def add_note(self, visit_id: int, author: str, text: str, at_ms: float) -> Future[int]:
+        """The id of a researcher's new note about a visit."""
+        return self.write(lambda connection: jobs.add_note(connection, visit_id, author, text, round(at_ms)))
+
+    def study_state(self, study: str) -> Future[str]:
+        """Whether a study takes new visits: open, paused or closed."""
+        return self.read(lambda connection: queries.study_state(connection, study))
+
+    def set_study_state(self, study: str, state: str, at_ms: float) -> Future[None]:
+        """Open, pause or close a study for new visits; those that run go on.
+
+        Raises: ValueError if there is no such state.
+        """
+        if state not in STUDY_STATES:
+            raise ValueError(f"no state of a study: {state!r}; use one of {STUDY_STATES}")
+        return self.write(lambda connection: jobs.set_study_state(connection, study, state, round(at_ms)))
+
+
+def _status(status: str) -> str:
+    if status not in VISIT_STATUSES:
+        raise ValueError(f"no status of a visit: {status!r}; use one of {VISIT_STATUSES}")
+    return status
+
+
+def _shown(questionnaire: Questionnaire | None) -> dict[str, dict[str, Any]]:
+    items = () if questionnaire is None else questionnaire.items
+    return {item.id: item.model_dump(mode="json") for item in items}
+
+
+def _passed(shown: Mapping[str, Any], value: Any) -> bool | None:
+    """Whether a check was answered as expected; None for what is no check or was not asked."""
+    expected = shown.get("expected")
+    return None if expected is None or value is None else value == expected

@@ -1,0 +1,348 @@
+"""The participant's pages: every step of a visit as HTML, and the forms that move it on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+from urllib.parse import urlencode
+
+import jinja2
+from fastapi import APIRouter, Request
+from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
+
+from galley.errors import GalleyError
+from galley.records import Store
+from galley.server.clock import Clock
+from galley.server.form_reading import FormError, read_form
+from galley.server.headers import same_origin
+from galley.server.participant.step_context import (
+    common_context,
+    ending_context,
+    public_fallback,
+    public_study,
+    questionnaire_of,
+    step_context,
+)
+from galley.server.participant.time_limits import time_is_up
+from galley.server.participant.visits import GRACE_S, TEST_PARAM, Visit, Visits
+from galley.server.rounds.lobby import Lobby, Meeting
+from galley.server.rounds.matches import Matches, RoundBusy
+from galley.server.rounds.relay import RELAYED, hand_over
+from galley.server.templates import templates as templates
+from galley.study.study import Study
+from galley.study.visit.plan import Step
+from galley.study.visit.progress import (
+    Agreed,
+    Continued,
+    Declined,
+    Happening,
+    Skipped,
+    Submitted,
+)
+from galley.study.written.languages import choose_language
+from galley.study.written.questionnaire import validate_answers
+from galley.translations import language_name, mark
+
+MAX_LINK_PARAMS = 30
+MAX_LINK_PARAM_CHARS = 200
+NEVER_CACHED = {"cache-control": "no-store"}
+LANGUAGE_PARAM = "language"
+
+NOT_FOUND = mark("Not found")
+NOT_USED = mark("Not used")
+UNKNOWN = mark("Unknown link")
+UNKNOWN_LINK = mark(
+    "This link is not known here. Please check that it is complete, "
+    "or begin again from the link you were sent."
+)
+NO_PAGE = mark("There is no page at this address. Please check that the link is complete.")
+FOREIGN = mark("This form was sent from another site, so it was not used.")
+UNREADABLE = mark("This form could not be read, so nothing was changed.")
+INVITED_ONLY = mark("By invitation")
+UNINVITED = mark(
+    "This study is for people who were invited. "
+    "Please use the whole link of your invitation, with the code at its end."
+)
+UNTESTED = mark(
+    "This test link is not good any more. Please make a new one on the study's page for researchers."
+)
+
+
+class Pages:
+    """Answers every HTTP request but those for static files."""
+
+    def __init__(
+        self,
+        studies: Mapping[str, Study],
+        visits: Visits,
+        matches: Matches,
+        lobby: Lobby,
+        store: Store,
+        clock: Clock,
+        templates: jinja2.Environment,
+        max_form_bytes: int,
+    ) -> None:
+        self._studies = studies
+        self._visits = visits
+        self._matches = matches
+        self._lobby = lobby
+        self._store = store
+        self._clock = clock
+        self._templates = templates
+        self._max_form_bytes = max_form_bytes
+
+    def router(self) -> APIRouter:
+        """The routes of all pages."""
+        router = APIRouter()
+        shown: dict[str, Any] = {"response_class": HTMLResponse, "response_model": None}
+        router.add_api_route("/", self.home, methods=["GET", "HEAD"], **shown)
+        router.add_api_route("/healthz", self.health, methods=["GET", "HEAD"], response_model=None)
+        router.add_api_route("/s/{study}", self.landing, methods=["GET", "HEAD"], **shown)
+        router.add_api_route("/s/{study}/begin", self.begin, methods=["POST"], **shown)
+        router.add_api_route("/v/{token}", self.visit, methods=["GET", "HEAD"], **shown)
+        router.add_api_route("/v/{token}", self.submit, methods=["POST"], **shown)
+        router.add_api_route("/v/{token}/away", self.away, methods=["POST"], response_model=None)
+        router.add_api_route("/v/{token}/lobby", self.waiting, methods=["GET"], response_model=None)
+        return router
+
+    # ---- before a visit ------------------------------------------------------------------------------------
+
+    async def home(self, request: Request) -> Response:
+        """The study when there is one, else a list."""
+        if len(self._studies) == 1:
+            return RedirectResponse(f"/s/{next(iter(self._studies))}", 303)
+        return self._page("studies.html", studies=[public_study(study) for study in self._studies.values()])
+
+    async def health(self) -> Response:
+        """Whether what happens reaches the database."""
+        health = self._store.health()
+        state = {"ok": health.ok, "rounds": len(self._matches), "rows_waiting": health.waiting_rows}
+        return JSONResponse(state, 200 if health.ok else 503, NEVER_CACHED)
+
+    async def landing(self, request: Request, study: str) -> Response:
+        """What the study is and how long it takes, with a button to begin; or why nobody can."""
+        found = self._studies.get(study)
+        if found is None:
+            return self.plain(404, NOT_FOUND, NO_PAGE)
+        spoken = found.in_language(_language(found, request))
+        params = _link_params(request)
+        why = await self._visits.closed(found, params)
+        if why is not None:
+            return self._not_begun(spoken, why)
+        others = {name: value for name, value in params.items() if name != LANGUAGE_PARAM}
+        offered = [
+            {
+                "code": code,
+                "name": language_name(code),
+                "url": f"/s/{study}?{urlencode({**others, LANGUAGE_PARAM: code})}",
+            }
+            for code in found.languages
+        ]
+        return self._page(
+            "landing.html",
+            study=public_study(spoken),
+            minutes=spoken.minutes,
+            action=f"/s/{study}/begin" + (f"?{urlencode(others)}" if others else ""),
+            language=spoken.language,
+            languages=offered,
+            test=TEST_PARAM in params,
+        )
+
+    async def begin(self, request: Request, study: str) -> Response:
+        """A new visit, or the one that this person has; the answer leads to its page."""
+        found = self._studies.get(study)
+        if found is None:
+            return self.plain(404, NOT_FOUND, NO_PAGE)
+        if not same_origin(request.headers):
+            return self.plain(403, NOT_USED, FOREIGN)
+        try:
+            form = await read_form(request, self._max_form_bytes)
+        except FormError as error:
+            return self.plain(error.status, NOT_USED, UNREADABLE)
+        chosen = form.get(LANGUAGE_PARAM, [""])[0]
+        language = chosen if chosen in found.languages else _language(found, request)
+        begun = await self._visits.begin(found, _link_params(request), language)
+        if not isinstance(begun, Visit):
+            return self._not_begun(found.in_language(language), begun)
+        return RedirectResponse(begun.url, 303, NEVER_CACHED)
+
+    # ---- a visit -------------------------------------------------------------------------------------------
+
+    async def visit(self, token: str) -> Response:
+        """The page of the step that the visit is at."""
+        visit = await self._visits.find(token)
+        if visit is None:
+            return self.plain(404, UNKNOWN, UNKNOWN_LINK)
+        overdue = self._visits.overdue(visit)
+        if overdue is not None:
+            await time_is_up(self._visits, self._matches, visit, overdue)
+            visit = await self._visits.find(token) or visit
+        if visit.progress.status not in ("active", "completed"):
+            return self._page("ending.html", **ending_context(visit))
+        await self._visits.entered(visit)
+        if not visit.active or visit.step.data.get("partner") != "human":
+            return self._step_page(visit)
+        meeting = await self._lobby.see(visit)
+        if meeting.waiting:
+            return self._lobby_page(visit, meeting)
+        if not meeting.begun:
+            return RedirectResponse(visit.url, 303, NEVER_CACHED)
+        return self._step_page(visit, partner="agent" if meeting.alone else "human")
+
+    async def waiting(self, token: str) -> Response:
+        """Whether somebody still has to wait for a partner, and how long at most; for scripts."""
+        visit = await self._visits.find(token)
+        if visit is None:
+            return JSONResponse({"waiting": False, "seconds_left": 0}, 404, NEVER_CACHED)
+        meeting = Meeting(waiting=False)
+        if visit.active and visit.step.data.get("partner") == "human":
+            meeting = await self._lobby.see(visit)
+        answer = {"waiting": meeting.waiting, "seconds_left": meeting.seconds_left}
+        return JSONResponse(answer, 200, NEVER_CACHED)
+
+    async def away(self, request: Request, token: str) -> Response:
+        """Note that a page was hidden or is seen again; for scripts, which read no answer."""
+        visit = await self._visits.find(token)
+        if visit is None or not same_origin(request.headers):
+            return Response(status_code=404 if visit is None else 403, headers=NEVER_CACHED)
+        try:
+            form = await read_form(request, self._max_form_bytes)
+        except FormError as error:
+            return Response(status_code=error.status, headers=NEVER_CACHED)
+        if visit.active and form.get("step") == [visit.step.id] and visit.step.kind != "round":
+            await self._visits.hidden(visit, hidden=form.get("hidden") == ["1"])
+        return Response(status_code=204, headers=NEVER_CACHED)
+
+    async def submit(self, request: Request, token: str) -> Response:
+        """Move on by what the step's form says; a form of another step changes nothing."""
+        if not same_origin(request.headers):
+            return self.plain(403, NOT_USED, FOREIGN)
+        visit = await self._visits.find(token)
+        if visit is None:
+            return self.plain(404, UNKNOWN, UNKNOWN_LINK)
+        language = visit.row.language
+        try:
+            form = await read_form(request, self._max_form_bytes)
+        except FormError as error:
+            return self.plain(error.status, NOT_USED, UNREADABLE, language)
+        step = visit.step
+        on = RedirectResponse(visit.url, 303, NEVER_CACHED)
+        if not visit.active or form.get("step", [""])[0] != step.id:
+            return on
+        overdue = self._visits.overdue(visit, GRACE_S)
+        if overdue is not None:
+            await time_is_up(self._visits, self._matches, visit, overdue)
+        elif step.kind == "round":
+            await self._round_form(visit, form, relayed=RELAYED in request.headers)
+        elif "skip" in form and step.skippable:
+            await self._visits.happened(visit, Skipped(step.id))
+        else:
+            return await self._answered(visit, form) or on
+        return on
+
+    async def _answered(self, visit: Visit, form: Mapping[str, list[str]]) -> Response | None:
+        """The page again when something is missing or it is too early; None once the form is used."""
+        step = visit.step
+        questionnaire = questionnaire_of(visit)
+        answers: Mapping[str, Any] | None = None
+        problems: Mapping[str, str] = {}
+        if questionnaire is not None:
+            answers, problems = validate_answers(questionnaire, form, self._visits.say(visit.row.language))
+        # A page that counts the seconds itself may be a little ahead of this clock.
+        soon = self._visits.overdue(visit, -GRACE_S)
+        if problems and "time_up" in form and soon is not None:
+            await time_is_up(self._visits, self._matches, visit, soon)
+            return None
+        early = visit.wait_s(self._clock.ms()) > 1.0 and step.kind != "consent"
+        if problems or early:
+            return self._step_page(visit, 422, form, problems, early=early)
+        happening = _happening(step, form)
+        if happening is not None:
+            await self._visits.happened(visit, happening, answers, questionnaire)
+        return None
+
+    async def _round_form(self, visit: Visit, form: Mapping[str, list[str]], *, relayed: bool) -> None:
+        if "skip" in form:
+            try:
+                await self._matches.skip(visit)
+            except RoundBusy as busy:
+                if relayed or not busy.address:
+                    raise GalleyError(str(busy)) from None
+                await hand_over(busy.address, visit.url, form)
+        elif "leave" in form and visit.step.data["partner"] == "human":
+            await self._lobby.leave(visit)
+
+    # ---- rendering -----------------------------------------------------------------------------------------
+
+    def plain(self, status: int, title: str, message: str, language: str = "en") -> Response:
+        """A page that only says something, a marked message in a language."""
+        say = self._visits.say(language)
+        return self._page(
+            "plain.html", status, title=say(title), message=say(message), status=status, language=language
+        )
+
+    def _not_begun(self, study: Study, why: str) -> Response:
+        if why == "uninvited":
+            return self.plain(403, INVITED_ONLY, UNINVITED, study.language)
+        if why == "untested":
+            return self.plain(403, NOT_USED, UNTESTED, study.language)
+        return self._page("ending.html", study=public_study(study), language=study.language, outcome=why)
+
+    def _step_page(
+        self,
+        visit: Visit,
+        status: int = 200,
+        values: Mapping[str, Sequence[str]] | None = None,
+        problems: Mapping[str, str] | None = None,
+        **more: Any,
+    ) -> Response:
+        context = common_context(visit, self._clock.ms()) | step_context(visit, values, problems) | more
+        return self._page(f"{visit.step.kind}.html", status, **context)
+
+    def _lobby_page(self, visit: Visit, meeting: Meeting) -> Response:
+        context = common_context(visit, self._clock.ms()) | {
+            "seconds_left": meeting.seconds_left,
+            "waited_s": meeting.waited_s,
+            "poll": f"{visit.url}/lobby",
+            "human_hat": visit.step.data["human_hat"],
+            "fallback": public_fallback(visit.step),
+            "round_no": visit.step.data["round_no"],
+            "of": visit.step.data["of"],
+        }
+        return self._page("lobby.html", **context)
+
+    def _page(self, template: str, status_code: int = 200, /, **values: Any) -> Response:
+        html = self._templates.get_template(template).render(**values)
+        return HTMLResponse(html, status_code, NEVER_CACHED)
+
+
+def _link_params(request: Request) -> dict[str, str]:
+    """The parameters of a link, of bounded number and length."""
+    return {
+        name[:MAX_LINK_PARAM_CHARS]: value[:MAX_LINK_PARAM_CHARS].replace("\0", "")
+        for name, value in list(request.query_params.items())[:MAX_LINK_PARAMS]
+    }
+
+
+def _language(study: Study, request: Request) -> str:
+    """The language that a link asks for, else the one the browser likes best."""
+    asked = request.query_params.get(LANGUAGE_PARAM, "")
+    if asked in study.languages:
+        return asked
+    return choose_language(study.languages, request.headers.get("accept-language"))
+
+
+def _happening(step: Step, form: Mapping[str, list[str]]) -> Happening | None:
+    """What a form without problems means for the visit; None when it says nothing."""
+    match step.kind:
+        case "consent":
+            choice = form.get("choice", [""])[0]
+            if choice == "decline":
+                return Declined(step.id)
+            return Agreed(step.id) if choice == "agree" else None
+        case "instructions" | "break":
+            return Continued(step.id)
+        case "questionnaire" | "comparison" | "quiz":
+            return Submitted(step.id)
+        case _:
+            return None

@@ -1,0 +1,293 @@
+"""Participants on their way through a study: begun, found again, moved on, kept to their time."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+from weakref import WeakValueDictionary
+
+from galley.records import Arrival, Planned, Store, VisitRow
+from galley.records.store.links_for_tests import LinkForTests, LinksForTests
+from galley.records.store.visit_standing import Attempt, standing
+from galley.server.clock import Clock
+from galley.study.study import Study
+from galley.study.visit.condition_slots import allocate, capacity, cell_number, cells, slot_in_cell
+from galley.study.visit.plan import Plan, Step, plan_visit, visit_seed
+from galley.study.visit.progress import (
+    Agreed,
+    Ended,
+    Happening,
+    Progress,
+    Refusal,
+    TimedOut,
+    next_progress,
+    position,
+)
+from galley.study.written.questionnaire import Questionnaire
+from galley.study.written.recruitment import INVITATION_PARAM
+from galley.translations import Catalogues, Translator
+
+GRACE_S: Final = 5.0
+"""How much later than its limit a form still counts: it was on its way."""
+
+TEST_PARAM: Final = "galley-test"
+"""The parameter of a test link; a name that no recruiter's link has."""
+
+NotBegun = Literal["full", "later", "paused", "closed", "uninvited", "untested"]
+
+
+@dataclass(frozen=True, slots=True)
+class Visit:
+    """A visit as stored, with the study it belongs to in its language.
+
+    `answers` are all so far by step and item; `entered_ms` is when the page of its step was first sent, None
+    before; `attempt` is the last failed try at the quiz that it is at.
+    """
+
+    row: VisitRow
+    study: Study
+    plan: Plan
+    progress: Progress
+    answers: Mapping[str, Mapping[str, Any]]
+    entered_ms: float | None
+    attempt: Attempt | None
+
+    @property
+    def step(self) -> Step:
+        """The step the participant is at."""
+        return self.plan.steps[self.progress.step_index]
+
+    @property
+    def url(self) -> str:
+        """The path of the participant's page."""
+        return f"/v/{self.row.token}"
+
+    @property
+    def active(self) -> bool:
+        """Whether it goes on."""
+        return self.progress.status == "active"
+
+    @property
+    def position(self) -> tuple[int, int]:
+        """(place, number) of its step among those it meets."""
+        return position(self.plan, self.progress, self.answers)
+
+    def spent_s(self, now_ms: float) -> float:
+        """How long it has been at its step."""
+        return 0.0 if self.entered_ms is None else max(0.0, (now_ms - self.entered_ms) / 1000.0)
+
+    def seconds_left(self, now_ms: float) -> float | None:
+        """What is left of the step's time; None without a limit."""
+        limit = self.step.time_limit_s
+        return None if limit is None else limit - self.spent_s(now_ms)
+
+    def visit_seconds_left(self, now_ms: float) -> float | None:
+        """What is left of the visit's time; None without a limit."""
+        limit = self.study.config.visit_limit_min
+        return None if limit is None else limit * 60.0 - (now_ms - self.row.created_ms) / 1000.0
+
+    def wait_s(self, now_ms: float) -> float:
+        """How long the participant has to stay at the step; 0 once they may go on."""
+        return max(0.0, self.step.at_least_s - self.spent_s(now_ms))
+
+
+class Visits:
+    """All visits to the studies that are served. Every answer is stored before its method returns.
+
+    With `preview` every new visit is a test: it takes no slot and counts nowhere.
+    """
+
+    def __init__(
+        self,
+        store: Store,
+        studies: Mapping[str, Study],
+        clock: Clock,
+        catalogues: Catalogues,
+        *,
+        preview: bool = False,
+    ) -> None:
+        self._store = store
+        self._studies = studies
+        self._clock = clock
+        self._catalogues = catalogues
+        self._preview = preview
+        self._locks: WeakValueDictionary[int, asyncio.Lock] = WeakValueDictionary()
+
+    # ---- beginning -----------------------------------------------------------------------------------------
+
+    def person(self, study: Study, params: Mapping[str, str]) -> str | None:
+        """Who a link's parameters say that this is; None when they do not say."""
+        if study.invitations is not None:
+            code = params.get(INVITATION_PARAM, "")
+            return f"code:{code}" if code in study.invitations else None
+        told = study.config.recruitment.participant
+        return (study.kept(params).get(told) if told is not None else None) or None
+
+    async def test_link(
+        self, study: Study, params: Mapping[str, str]
+    ) -> LinkForTests | Literal["bad"] | None:
+        """The test link that parameters name; `bad` if it is not good any more; None if they name none."""
+        token = params.get(TEST_PARAM)
+        if token is None:
+            return None
+        links = LinksForTests(self._store)
+        return await asyncio.wrap_future(links.find(study.name, token, self._clock.ms())) or "bad"
+
+    async def closed(self, study: Study, params: Mapping[str, str]) -> NotBegun | None:
+        """Why somebody with such a link cannot begin, as far as is known before they try; None if they can.
+
+        Who may have a visit already is never sent away: beginning leads back to it. Test links always let in.
+        """
+        if self._preview:
+            return None
+        link = await self.test_link(study, params)
+        if link is not None:
+            return "untested" if link == "bad" else None
+        who = self.person(study, params)
+        if study.invitations is not None and who is None:
+            return "uninvited"
+        state = await asyncio.wrap_future(self._store.study_state(study.name))
+        return state if state != "open" and who is None else None  # type: ignore[return-value]
+
+    async def begin(self, study: Study, params: Mapping[str, str], language: str) -> Visit | NotBegun:
+        """A visit at its first step, or the one that this person has already, or why there is none."""
+        who = self.person(study, params)
+        link = await self.test_link(study, params)
+        if link == "bad":
+            return "untested"
+        test = self._preview or link is not None
+        if study.invitations is not None and who is None and not test:
+            return "uninvited"
+        spoken = study.in_language(language)
+        say = self.say(spoken.language)
+        design = cells(study.config)
+
+        def plan(visit_no: int, slot: int | None) -> Planned:
+            if slot is None and link is not None and link.cell is not None:
+                slot = slot_in_cell(study, link.cell, visit_no)
+            seed = visit_seed(study, visit_no)
+            made = plan_visit(spoken, seed, visit_no, slot, say)
+            return Planned(seed, made.to_json(), made.condition, design[cell_number(study, made.slot)])
+
+        now_ms = self._clock.ms()
+        expires_ms = study.config.slot_expires_min * 60_000.0
+        arrival = Arrival(
+            study.name,
+            study.sha256,
+            now_ms,
+            study.kept(params),
+            spoken.language,
+            who,
+            once=study.invitations is not None or study.config.recruitment.once,
+            test=test,
+        )
+        begun = await asyncio.wrap_future(
+            self._store.begin_visit(
+                arrival, plan, lambda slots: allocate(slots, now_ms, expires_ms, capacity(study))
+            )
+        )
+        if begun.visit is None:
+            return begun.why  # type: ignore[return-value]
+        found = await self.find(begun.visit.token)
+        if found is None:
+            raise RuntimeError(f"visit {begun.visit.id} vanished")
+        return found
+
+    # ---- on the way ----------------------------------------------------------------------------------------
+
+    def say(self, language: str) -> Translator:
+        """Speaks a visit's language."""
+        return self._catalogues.translator(language)
+
+    async def find(self, token: str) -> Visit | None:
+        """The visit behind a link; None when there is none or its study is not served."""
+        found = await asyncio.wrap_future(self._store.read(lambda connection: standing(connection, token)))
+        study = None if found is None else self._studies.get(found.visit.study)
+        if found is None or study is None:
+            return None
+        row = found.visit
+        plan = Plan.from_json(row.plan_json)
+        here = plan.steps[row.step_index].id
+        attempt = found.attempt if found.attempt is not None and found.attempt.step_id == here else None
+        return Visit(
+            row,
+            study.in_language(row.language),
+            plan,
+            Progress(row.step_index, row.status, row.tries),  # type: ignore[arg-type]
+            found.answers,
+            found.entered_ms.get(here),
+            attempt,
+        )
+
+    async def entered(self, visit: Visit) -> None:
+        """Note that the page of the visit's step is sent."""
+        await asyncio.wrap_future(self._store.enter_step(visit.row.id, visit.step.id, self._clock.ms()))
+
+    async def hidden(self, visit: Visit, *, hidden: bool) -> None:
+        """Note that the page of the visit's step was hidden, or is seen again."""
+        now_ms = self._clock.ms()
+        if hidden:
+            await asyncio.wrap_future(self._store.left_page(visit.row.id, visit.step.id, now_ms))
+        else:
+            await asyncio.wrap_future(self._store.back_on_page(visit.row.id, now_ms))
+
+    def overdue(self, visit: Visit, grace_s: float = 0.0) -> Happening | None:
+        """What the passing of time does to a visit, or did `grace_s` ago; None while no limit has passed."""
+        if not visit.active:
+            return None
+        now_ms = self._clock.ms() - grace_s * 1000.0
+        whole_s = visit.visit_seconds_left(now_ms)
+        if whole_s is not None and whole_s <= 0:
+            return Ended(visit.step.id, "timed_out")
+        left_s = visit.seconds_left(now_ms)
+        return TimedOut(visit.step.id) if left_s is not None and left_s <= 0 else None
+
+    async def happened(
+        self,
+        visit: Visit,
+        happening: Happening,
+        answers: Mapping[str, Any] | None = None,
+        questionnaire: Questionnaire | None = None,
+    ) -> bool:
+        """Whether the visit changed by this; what came twice, late or early changes nothing."""
+        lock = self._locks.setdefault(visit.row.id, asyncio.Lock())
+        async with lock:
+            now = await self.find(visit.row.token)
+            if now is None:
+                return False
+            if now.attempt is not None and answers is not None and now.attempt.answers == answers:
+                return False  # the same form again is no new try
+            given = dict(now.answers) if answers is None else {**now.answers, now.step.id: answers}
+            following = next_progress(now.plan, now.progress, happening, given)
+            if isinstance(following, Refusal):
+                return False
+            at_ms = self._clock.ms()
+            if following.status == "active" and following.step_index == now.progress.step_index:
+                return await asyncio.wrap_future(
+                    self._store.save_attempt(
+                        now.row.id, now.step.id, following.tries, answers or {}, at_ms, questionnaire
+                    )
+                )
+            code = None
+            if following.status != "active":
+                code = now.study.ending(following.status, now.row.link_params).code
+            return await asyncio.wrap_future(
+                self._store.save_answers(
+                    now.row.id,
+                    now.step.id,
+                    answers or {},
+                    following.step_index,
+                    following.status,
+                    at_ms,
+                    completion_code=code,
+                    questionnaire=questionnaire,
+                    consent_sha256=_agreed_to(now) if isinstance(happening, Agreed) else None,
+                )
+            )
+
+
+def _agreed_to(visit: Visit) -> str:
+    """The hash of the text that a consent page shows."""
+    return visit.study.texts[visit.step.data["text"]].sha256

@@ -1,0 +1,110 @@
+"""A round as its replay page gets it: every state worked out here by the rules, sent as what changed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from galley.kitchen import Layout
+from galley.kitchen.codes import DELIVERIES, TICK
+from galley.kitchen.events import decode
+from galley.kitchen.trajectory import Replay, play
+from galley.protocol.scene import Scene, happenings
+from galley.records import RoundRow
+from galley.records.reading.round_replay import nobody
+
+NO_HAT = "orange"
+
+
+def episodes(layout: Layout, joint_actions: NDArray[np.uint8], count: int) -> tuple[Replay, ...]:
+    """The episodes that `joint_actions` uint8[T,2] make one after the other, at most `count`; at least one.
+
+    A finished kitchen does not change, so its clock tells how many actions were its own.
+    """
+    found = []
+    left = joint_actions
+    while True:
+        whole = play(layout, left)
+        ticks = int(whole.states[-1, TICK])
+        found.append(Replay(layout, whole.states[: ticks + 1], whole.out[:ticks]))
+        left = left[ticks:]
+        if not len(left) or ticks == 0 or len(found) == count:
+            return tuple(found)
+
+
+def replay_document(row: RoundRow, ticks: Mapping[int, Mapping[str, Any]], after: int = 0) -> dict[str, Any]:
+    """The round for its page: fixed facts, a keyframe per episode, and each tick from `after` on.
+
+    `ticks` are the stored rows by number. Keyframes and ticks are those of the play socket
+    (docs/protocol.md); beside each tick stand both actions and why the agent's was not its own, if so.
+    """
+    layout = Layout.from_dict(json.loads(row.layout_json))
+    scene = Scene(layout)
+    hats = [seat.hat or NO_HAT for seat in row.seats]
+    human = next((seat.seat for seat in row.seats if seat.agent is None), 0)
+    frames: list[dict[str, Any]] = []
+    steps: list[dict[str, Any]] = []
+    first, score = 0, 0
+    for replay in episodes(layout, row.joint_actions, row.episodes):
+        frames.append({"at": first, "board": _keyframe(row, scene, replay, hats, human, score)})
+        for number in range(max(0, after - first), len(replay.out)):
+            before, now, out = replay.states[number], replay.states[number + 1], replay.out[number]
+            at = first + number
+            changes = scene.changes(before, now)
+            steps.append(
+                {
+                    "actions": row.joint_actions[at].tolist(),
+                    "why": _why(ticks.get(at)),
+                    **changes,
+                    "score": score + changes["score"],
+                    "events": happenings(decode(layout, before, now, out)),
+                }
+            )
+        first += len(replay.out)
+        score += int(replay.states[-1, DELIVERIES]) * layout.rules.delivery_reward
+    return {
+        "status": row.status,
+        "from": min(after, first),
+        "ticks": first,
+        "whole": row.horizon_ticks * row.episodes,
+        "tick_ms": row.tick_ms,
+        "score": score,
+        "frames": frames,
+        "steps": steps,
+    }
+
+
+def _keyframe(
+    row: RoundRow, scene: Scene, replay: Replay, hats: list[str], human: int, score: int
+) -> dict[str, Any]:
+    whole = scene.whole(replay.states[0])
+    return {
+        "type": "keyframe",
+        "phase": "ended",
+        "tick": 0,
+        "horizon": row.horizon_ticks,
+        "tick_ms": row.tick_ms,
+        "seat": human,
+        "hats": hats,
+        "partner": "none" if any(map(nobody, row.seats)) else "agent",
+        "grid": scene.grid,
+        "cook_time": scene.layout.rules.cook_time_ticks,
+        "goal": None,
+        "round": row.round_no,
+        "of": row.round_no,
+        "tutorial": row.round_no == 0,
+        **whole,
+        "score": score,
+    }
+
+
+def _why(tick: Mapping[str, Any] | None) -> str | None:
+    """Why the agent stayed although it decided nothing or something else; None for its own decision."""
+    if tick is None:
+        return None
+    fault: str | None = tick["fault"]
+    return fault or ("late" if tick["late"] else None)

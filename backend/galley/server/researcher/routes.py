@@ -1,0 +1,69 @@
+"""All routes of the researcher's pages in one table, every one of them behind the gate."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable, Mapping
+
+from fastapi import APIRouter
+
+from galley.records import Store
+from galley.server.clock import Clock
+from galley.server.researcher.desk import Desk
+from galley.server.researcher.downloads import DownloadPages
+from galley.server.researcher.formats import templates
+from galley.server.researcher.login import HOME, LOGIN, Gate
+from galley.server.researcher.round_pages import RoundPages
+from galley.server.researcher.study_pages import StudyPages
+from galley.server.researcher.visit_pages import VisitPages
+from galley.study.study import Study
+
+
+def researcher_pages(
+    *,
+    store: Store,
+    database: str,
+    studies: Mapping[str, Study],
+    folder: str,
+    clock: Clock,
+    stop_visit: Callable[[int], Awaitable[None]],
+) -> APIRouter:
+    """The routes under /researcher. `folder` holds the templates; for the rest see Desk."""
+    environment = templates(folder)
+    gate = Gate(store, environment, clock)
+    desk = Desk(store, database, studies, environment, clock, gate, stop_visit)
+    about_studies, about_visits = StudyPages(desk), VisitPages(desk)
+    about_rounds, files = RoundPages(desk), DownloadPages(desk)
+
+    router = APIRouter()
+    router.add_route(LOGIN, gate.login_page, methods=["GET"])
+    router.add_route(LOGIN, gate.login, methods=["POST"])
+    pages = {
+        "": about_studies.home,
+        "/studies/{study}": about_studies.study,
+        "/studies/{study}/visits": about_studies.visits,
+        "/studies/{study}/rounds": about_studies.rounds,
+        "/studies/{study}/download/{kind}": files.download,
+        "/visits/{visit:int}": about_visits.visit,
+        "/rounds/{round:int}": about_rounds.round,
+        "/rounds/{round:int}/film.{kind}": files.film,
+    }
+    data = {
+        "/live.json": about_studies.home_live,
+        "/studies/{study}/live.json": about_studies.study_live,
+        "/rounds/{round:int}/replay.json": about_rounds.replay,
+    }
+    deeds = {
+        "/logout": gate.logout,
+        "/studies/{study}/state": about_studies.set_state,
+        "/studies/{study}/test-links": about_studies.make_test_link,
+        "/studies/{study}/test-links/withdraw": about_studies.withdraw_test_link,
+        "/visits/{visit:int}/notes": about_visits.note,
+        "/visits/{visit:int}/erase": about_visits.erase,
+    }
+    for path, page in pages.items():
+        router.add_route(f"{HOME}{path}", gate.page(page), methods=["GET"])
+    for path, page in data.items():
+        router.add_route(f"{HOME}{path}", gate.data(page), methods=["GET"])
+    for path, deed in deeds.items():
+        router.add_route(f"{HOME}{path}", gate.deed(deed), methods=["POST"])
+    return router

@@ -1,0 +1,103 @@
+"""The researcher's pages about one visit: what happened, notes, and erasing it for good."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+from fastapi import Request
+from fastapi.responses import RedirectResponse, Response
+
+from galley.errors import GalleyError
+from galley.records.reading import overview
+from galley.records.rows import SessionRow
+from galley.records.store.erase import erase_participant
+from galley.server.researcher.desk import Desk, number
+from galley.server.researcher.login import HOME, NEVER_CACHED, Form, first
+
+LONGEST_NOTE = 4000
+MOST_ROUNDS = 1000
+
+
+class VisitPages:
+    """One visit by its number."""
+
+    def __init__(self, desk: Desk) -> None:
+        self._desk = desk
+
+    async def visit(self, request: Request, session: SessionRow) -> Response:
+        """Timeline, answers, rounds, flags and notes of a visit."""
+        return await self._page(number(request, "visit"), session)
+
+    async def note(self, request: Request, session: SessionRow, form: Form) -> Response:
+        """Add a note, signed with the researcher's name."""
+        visit_id, text = number(request, "visit"), first(form, "text").replace("\0", "").strip()
+        if await self._found(visit_id) is None:
+            return self._desk.missing(session, "visit")
+        if not text or len(text) > LONGEST_NOTE:
+            problem = f"A note has 1 to {LONGEST_NOTE} characters; this one has {len(text)}."
+            return await self._page(visit_id, session, 422, note=text, note_problem=problem)
+        store, author = self._desk.store, session.researcher.name
+        await asyncio.wrap_future(store.add_note(visit_id, author, text, self._desk.clock.ms()))
+        return RedirectResponse(f"{HOME}/visits/{visit_id}#notes", 303, NEVER_CACHED)
+
+    async def erase(self, request: Request, session: SessionRow, form: Form) -> Response:
+        """Erase the participant for good, once their name was typed as it stands there."""
+        visit_id = number(request, "visit")
+        found = await self._found(visit_id)
+        if found is None:
+            return self._desk.missing(session, "visit")
+        if first(form, "confirm").strip() != found.participant:
+            problem = f"Nothing was erased. To erase this participant, type {found.participant} exactly."
+            return await self._page(visit_id, session, 422, erase_problem=problem)
+        store, now_ms = self._desk.store, self._desk.clock.ms()
+        # A visit that is over cannot take up its round again between the match's end and the erasing.
+        await asyncio.wrap_future(store.end_visit(visit_id, "expired", now_ms))
+        await self._desk.stop_visit(visit_id)
+        try:
+            erased = await asyncio.to_thread(erase_participant, store, found.participant)
+        except GalleyError as error:
+            return self._desk.gate.plain(session, 409, "Not erased", f"{error}.")
+        told = f"{found.participant} was erased for good: visits {erased.visits}, rounds {erased.rounds}."
+        return self._desk.gate.plain(session, 200, "Erased", told)
+
+    async def _found(self, visit_id: int) -> Any:
+        return await self._desk.read(lambda connection: overview.visit(connection, visit_id))
+
+    async def _page(
+        self,
+        visit_id: int,
+        session: SessionRow,
+        status: int = 200,
+        *,
+        note: str = "",
+        note_problem: str = "",
+        erase_problem: str = "",
+    ) -> Response:
+        def read(connection: Any) -> dict[str, Any] | None:
+            visit = overview.visit(connection, visit_id)
+            if visit is None:
+                return None
+            rounds = overview.rounds(connection, visit.study, visit_id=visit_id, limit=MOST_ROUNDS, offset=0)
+            return {
+                "visit": visit,
+                "study": visit.study,
+                "timeline": overview.timeline(connection, visit_id),
+                "answers": overview.answers(connection, visit_id),
+                "rounds": sorted(rounds, key=lambda round_: round_.id),
+                "notes": overview.notes(connection, visit_id),
+            }
+
+        values = await self._desk.read(read)
+        if values is None:
+            return self._desk.missing(session, "visit")
+        return self._desk.show(
+            session,
+            "visit.html",
+            status,
+            note=note,
+            note_problem=note_problem,
+            erase_problem=erase_problem,
+            longest_note=LONGEST_NOTE,
+            **values,
+        )

@@ -1,0 +1,1 @@
+"""Live rounds: matches, their clock, sockets, agents and take-over."""

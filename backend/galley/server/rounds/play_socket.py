@@ -1,0 +1,217 @@
+"""The play socket: one browser's connection to its round."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections import deque
+
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from galley.protocol import messages as wire
+from galley.server.headers import same_origin
+from galley.server.participant.visits import Visits
+from galley.server.rounds.match import LEFT, RESTART
+from galley.server.rounds.matches import Matches, Place, RoundBusy
+from galley.server.rounds.relay import RELAYED, pass_on
+from galley.server.rounds.round_journal import Handed
+
+LOG = logging.getLogger(__name__)
+MAX_BEHIND = 200
+HELLO_WITHIN_S = 20.0
+CLOSE_WITHIN_S = 5.0
+SERVICE_RESTART = 1012  # RFC 6455 registry: the server is going down; browsers cannot send it
+
+
+class Socket:
+    """Sends frames in order without making anybody wait.
+
+    A browser that is MAX_BEHIND frames behind gets, instead of those, one picture of the whole when it is
+    there again.
+    """
+
+    def __init__(self, websocket: WebSocket) -> None:
+        self.tab = ""
+        self.place: Place | None = None
+        self._websocket = websocket
+        self._loop = asyncio.get_running_loop()
+        self._queue: deque[tuple[str, Handed | None]] = deque()
+        self._wake = asyncio.Event()
+        self._close_code: int | None = None
+        self._behind = False
+
+    def send(self, text: str, handed: Handed | None = None) -> None:
+        """Queue a frame; `handed` learns when it was given to the socket."""
+        if len(self._queue) >= MAX_BEHIND:
+            self._queue.clear()
+            self._behind = True
+        if not self._behind:
+            self._queue.append((text, handed))
+            self._wake.set()
+
+    def close(self, code: int) -> None:
+        """Close once everything queued is sent."""
+        if self._close_code is None:
+            self._close_code = code
+        self._wake.set()
+
+    @property
+    def closing(self) -> bool:
+        """Whether `close` was called."""
+        return self._close_code is not None
+
+    async def run(self) -> None:
+        """Send until closed or lost."""
+        try:
+            while True:
+                while self._queue:
+                    text, handed = self._queue.popleft()
+                    await self._websocket.send_text(text)
+                    if handed is not None:
+                        handed.at_s = self._loop.time()
+                if self._behind:
+                    self._behind = False
+                    if self.place is not None and self.place.person.connection is self:
+                        self.place.match.show(self.place.person)
+                        continue
+                if self._close_code is not None:
+                    await self._websocket.close(self._close_code)
+                    return
+                self._wake.clear()
+                await self._wake.wait()
+        except (WebSocketDisconnect, RuntimeError, OSError):
+            # The browser is gone; the listening side sees it too and tells the match.
+            return
+
+
+class Pace:
+    """Keeps a connection to so many messages a second, with two seconds' worth at once."""
+
+    def __init__(self, per_s: float, now_s: float) -> None:
+        self._per_s = per_s
+        self._left = 2.0 * per_s
+        self._at_s = now_s
+
+    def wait_s(self, now_s: float) -> float:
+        """How long to wait before taking the next message."""
+        self._left = min(2.0 * self._per_s, self._left + (now_s - self._at_s) * self._per_s) - 1.0
+        self._at_s = now_s
+        return max(0.0, -self._left / self._per_s)
+
+    async def wait(self) -> None:
+        """Return when the next message may be taken."""
+        if wait_s := self.wait_s(asyncio.get_running_loop().time()):
+            await asyncio.sleep(wait_s)
+
+
+class Play:
+    """The endpoint of all play sockets."""
+
+    def __init__(self, visits: Visits, matches: Matches, messages_per_s: int) -> None:
+        self._visits = visits
+        self._matches = matches
+        self._messages_per_s = messages_per_s
+
+    async def endpoint(self, websocket: WebSocket, token: str) -> None:
+        """One connection from handshake to close; a foreign page or an unknown link gets 403."""
+        if not same_origin(websocket.headers) or await self._visits.find(token) is None:
+            await websocket.close()
+            return
+        await websocket.accept()
+        socket = Socket(websocket)
+        sender = asyncio.create_task(socket.run())
+        reason = LEFT
+        try:
+            reason = await self._listen(websocket, socket, token)
+            if socket.closing:
+                await asyncio.wait([sender], timeout=CLOSE_WITHIN_S)
+        finally:
+            if socket.place is not None:
+                socket.place.match.leave(socket, reason)
+            sender.cancel()
+
+    async def _listen(self, websocket: WebSocket, socket: Socket, token: str) -> str:
+        loop = asyncio.get_running_loop()
+        pace = Pace(self._messages_per_s, loop.time())
+        hello_by_s = loop.time() + HELLO_WITHIN_S
+        last_seq = -1
+        while True:
+            if socket.place is not None:
+                event = await websocket.receive()
+            else:
+                try:
+                    async with asyncio.timeout_at(hello_by_s):
+                        event = await websocket.receive()
+                except TimeoutError:
+                    socket.close(wire.CLOSE_REFUSED)
+                    return LEFT
+            if event["type"] == "websocket.disconnect":
+                return RESTART if event.get("code") == SERVICE_RESTART else LEFT
+            arrival_s = loop.time()
+            try:
+                text = event.get("text")
+                frame = event.get("bytes") or b"" if text is None else text
+                message = wire.parse(frame)
+                if isinstance(message, wire.Key | wire.Release):
+                    if message.seq <= last_seq:
+                        raise wire.MessageError(f"seq {message.seq} does not come after {last_seq}")
+                    last_seq = message.seq
+                if isinstance(message, wire.Hello):
+                    busy = await self._hello(socket, token, message)
+                    if busy is not None and busy.address and RELAYED not in websocket.headers:
+                        path = websocket.url.path
+                        code = await pass_on(websocket, busy.address, path, frame, pace.wait)
+                        socket.close(code)
+                    elif busy is not None:
+                        socket.close(wire.CLOSE_BUSY)
+                    if socket.place is None:
+                        return LEFT
+                elif socket.place is None:
+                    raise wire.MessageError("the first message is hello")
+                else:
+                    _pass_on(socket.place, socket, message, arrival_s)
+            except wire.MessageError as error:
+                socket.send(wire.encode("refused", reason=str(error)))
+            await pace.wait()
+
+    async def _hello(self, socket: Socket, token: str, hello: wire.Hello) -> RoundBusy | None:
+        """Give the socket its place, or close it, or say that another process has the round.
+
+        Raises: MessageError for a second hello.
+        """
+        if socket.place is not None:
+            raise wire.MessageError("hello was said already")
+        if hello.protocol != wire.PROTOCOL:
+            socket.send(
+                wire.encode("refused", reason=f"the protocol is {wire.PROTOCOL}; load the page again")
+            )
+            socket.close(wire.CLOSE_REFUSED)
+            return None
+        visit = await self._visits.find(token)
+        try:
+            place = None if visit is None else await self._matches.of(visit)
+        except RoundBusy as busy:
+            return busy
+        if place is None:
+            socket.close(wire.CLOSE_ENDED)
+            return None
+        socket.tab = hello.tab
+        socket.place = place
+        place.match.join(place.person, socket)
+        return None
+
+
+def _pass_on(place: Place, socket: Socket, message: wire.Incoming, arrival_s: float) -> None:
+    """Give a message to the match. Raises: MessageError when it is out of turn."""
+    match, person = place.match, place.person
+    if person.connection is not socket:
+        raise wire.MessageError("this round is open in another tab")
+    match message:
+        case wire.Ready():
+            match.ready(person)
+        case wire.Key():
+            match.key(person, message, arrival_s)
+        case wire.Release():
+            match.release(person, message, arrival_s)
+        case wire.Ping():
+            match.ping(person, message, arrival_s)

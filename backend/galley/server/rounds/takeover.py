@@ -1,0 +1,52 @@
+"""Taking a round up where its journal ends: its kitchen, and agents that have seen what happened in it."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from galley.agents.bundle import Bundle
+from galley.agents.protocol import Agent
+from galley.kitchen import Layout
+from galley.server.rounds.episodes import Course
+from galley.server.rounds.thinking import Unable
+
+LOG = logging.getLogger(__name__)
+
+
+def caught_up(layout: Layout, episodes: int, joint_actions: NDArray[np.uint8]) -> Course:
+    """The kitchen after the joint actions (uint8 [T, 2]) of all episodes so far."""
+    course = Course(layout, episodes)
+    for first, second in joint_actions.tolist():
+        if course.between:
+            course.next_episode()
+        course.step(first, second)
+    if course.between:
+        course.next_episode()
+    return course
+
+
+def ready_agent(
+    bundle: Bundle, course: Course, seat: int, seeds: Sequence[int], joint_actions: NDArray[np.uint8]
+) -> Agent:
+    """An agent of the bundle that has seen the episode that a kitchen is in, as if it had always played it.
+
+    One that fails at that is replaced by one that stays where it is.
+    """
+    layout = course.layout
+    seen = joint_actions[len(joint_actions) - course.kitchen.tick :]
+    try:
+        agent: Agent = bundle.make()
+        agent.reset(layout, seat, seeds[course.episode - 1])
+        again = Course(layout)
+        for first, second in seen.tolist():
+            before = again.kitchen.state.copy()
+            again.step(first, second)
+            agent.observe(before, (first, second))
+    except Exception:  # whatever a researcher's agent raises, the round goes on
+        LOG.exception("agent %s cannot take up a round on layout %s", bundle.name, layout.name)
+        return Unable()
+    return agent

@@ -1,0 +1,1 @@
+"""What one participant meets: slot, plan, steps and progress."""

@@ -1,0 +1,62 @@
+"""The files that a study names: layouts that can be used, texts in a language, the hash of them all."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
+from pathlib import Path
+
+from galley.errors import InvalidFiles, Problem
+from galley.kitchen import Layout
+from galley.kitchen.layout_file import load_layout, load_layouts
+from galley.study.written.study_file import StudyFile, names_of
+from galley.workspace import Workspace
+
+
+def known_layouts_of(
+    workspace: Workspace, problems: list[Problem]
+) -> tuple[Mapping[str, Layout], tuple[str, ...]]:
+    """(layouts by name and alias, names that may be used); what is wrong with layouts joins `problems`."""
+    try:
+        layouts = load_layouts(workspace)
+    except InvalidFiles as invalid:
+        problems += invalid.problems
+        layouts = dict(_good_layouts(workspace))
+    return layouts, tuple({*layouts, *workspace.names("layouts")})
+
+
+def _good_layouts(workspace: Workspace) -> Iterator[tuple[str, Layout]]:
+    for name in workspace.names("layouts"):
+        with suppress(InvalidFiles):
+            layout = load_layout(workspace.find("layouts", name))
+            yield from ((called, layout) for called in (*layout.aliases, name))
+
+
+def text_file(workspace: Workspace, name: str, language: str, *, own: bool) -> Path | None:
+    """`texts/NAME.LANGUAGE.md`, or in the study's `own` language `texts/NAME.md` if there is no such file."""
+    known = workspace.names("texts")
+    if f"{name}.{language}" in known:
+        return workspace.find("texts", f"{name}.{language}")
+    return workspace.find("texts", name) if own and name in known else None
+
+
+def content_sha256(workspace: Workspace, name: str, config: StudyFile, layouts: Iterable[Layout]) -> str:
+    """The hash over names and contents of the study's file and of all it names, in all its languages."""
+    texts = (
+        text_file(workspace, text, language, own=language == config.languages[0])
+        for text in names_of(config, "texts")
+        for language in config.languages
+    )
+    files = {
+        workspace.find("studies", name),
+        *(workspace.find("questionnaires", name) for name in names_of(config, "questionnaires")),
+        *(text for text in texts if text is not None),
+        *(workspace.find("layouts", layout.name) for layout in layouts),
+    }
+    total = hashlib.sha256()
+    for file in sorted(files):
+        content = file.read_bytes()
+        total.update(f"{workspace.shown(file)}\0{len(content)}\0".encode())
+        total.update(content)
+    return total.hexdigest()

@@ -1,0 +1,187 @@
+"""The kinds of items that phase one had not: sliders, rankings, opposites, orders, scores."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from galley.study.scores import signed_preference, subscale_scores, wrong_items
+from galley.study.visit.plan import item_order
+from galley.study.written.questionnaire import load_questionnaire, rank_field, validate_answers
+from tests.study.workspaces import ROOT
+from tests.study.written.test_questionnaire import OPTIONS, SCALE, made
+
+THREE = [{"value": value, "label": value.upper()} for value in ("a", "b", "c")]
+SLIDER = {"kind": "slider", "low_label": "no", "high_label": "yes"}
+
+
+def answer(item: dict[str, Any], form: dict[str, list[str]]) -> tuple[Any, str | None]:
+    answers, problems = validate_answers(made(item), form)
+    return answers["q0"], problems.get("q0")
+
+
+@pytest.mark.parametrize(
+    ("item", "given", "wanted"),
+    [
+        (SLIDER, "0", 0),
+        (SLIDER, "100", 100),
+        ({**SLIDER, "step": 5}, "35", 35),
+        ({**SLIDER, "min": -1, "max": 1, "step": 0.1}, "-0.3", -0.3),
+        ({**SLIDER, "min": 0, "max": 1, "step": 0.25}, "0,75", 0.75),
+        ({"kind": "semantic_differential", **SCALE, "scale": 5}, "5", 5),
+        ({"kind": "likert", **SCALE, "scale": 21}, "21", 21),
+    ],
+)
+def test_points_are_stored_as_numbers(item: dict[str, Any], given: str, wanted: object) -> None:
+    assert answer(item, {"q0": [given]}) == (wanted, None)
+
+
+@pytest.mark.parametrize(
+    ("item", "given"),
+    [
+        (SLIDER, ""),
+        (SLIDER, "101"),
+        (SLIDER, "-1"),
+        (SLIDER, "50.5"),
+        (SLIDER, "half"),
+        (SLIDER, "1e2"),
+        ({**SLIDER, "step": 5}, "36"),
+        ({"kind": "semantic_differential", **SCALE, "scale": 5}, "6"),
+    ],
+)
+def test_untouched_sliders_and_points_beside_the_line_are_refused(item: dict[str, Any], given: str) -> None:
+    value, problem = answer(item, {"q0": [given]})
+    assert value is None
+    assert problem
+    assert problem.startswith("Please ")
+    assert answer(item, {})[1]
+
+
+def test_a_slider_that_need_not_be_answered_stores_nothing_untouched() -> None:
+    assert answer({**SLIDER, "required": False}, {"q0": [""]}) == (None, None)
+
+
+def ranked(**places: str) -> dict[str, list[str]]:
+    return {rank_field("q0", value): [place] for value, place in places.items()}
+
+
+RANKING = {"kind": "ranking", "options": THREE}
+
+
+def test_a_ranking_is_stored_with_the_first_place_first() -> None:
+    assert answer(RANKING, ranked(a="2", b="3", c="1")) == (["c", "a", "b"], None)
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        {},
+        ranked(a="1", b="2"),
+        ranked(a="1", b="2", c=""),
+        ranked(a="1", b="1", c="2"),
+        ranked(a="0", b="1", c="2"),
+        ranked(a="1", b="2", c="4"),
+        {**ranked(a="1", b="2"), rank_field("q0", "c"): ["3", "3"]},
+    ],
+)
+def test_a_ranking_needs_every_place_once(form: dict[str, list[str]]) -> None:
+    value, problem = answer(RANKING, form)
+    assert value is None
+    assert problem
+
+
+def test_a_ranking_may_be_left_out_whole_but_not_in_part() -> None:
+    item = {**RANKING, "required": False}
+    assert answer(item, {}) == (None, None)
+    assert answer(item, ranked(a="1"))[1]
+
+
+@given(places=st.permutations(["1", "2", "3"]))
+def test_any_complete_ranking_is_an_answer(places: list[str]) -> None:
+    value, problem = answer(RANKING, ranked(**dict(zip("abc", places, strict=True))))
+    assert problem is None
+    assert [places["abc".index(option)] for option in value] == ["1", "2", "3"]
+
+
+def test_wrong_answers_of_a_quiz_come_with_their_hints() -> None:
+    quiz = made(
+        {"kind": "number", "min": 0, "max": 9, "expected": 3, "hint": "Look again."},
+        {"kind": "multiple_choice", "options": THREE, "expected": ["a", "c"]},
+        {"kind": "slider", **{k: SLIDER[k] for k in ("low_label", "high_label")}, "expected": 50},
+        {"kind": "single_choice", "options": OPTIONS, "expected": "yes"},
+    )
+    right = {"q0": 3, "q1": ["c", "a"], "q2": 50, "q3": "yes"}
+    assert wrong_items(quiz, right) == {}
+    assert wrong_items(quiz, {**right, "q0": 4, "q1": ["a"]}) == {"q0": "Look again.", "q1": ""}
+    assert quiz.expected == {"q0": 3.0, "q1": ["a", "c"], "q2": 50.0, "q3": "yes"}
+
+
+def test_preferences_are_signed_from_the_middle_of_the_scale() -> None:
+    item = made({"kind": "comparison", **SCALE}).items[0]
+    assert [signed_preference(item, point) for point in (1, 4, 7)] == [-3, 0, 3]  # type: ignore[arg-type]
+    assert signed_preference(item, None) is None  # type: ignore[arg-type]
+
+
+def test_subscales_are_averaged_with_reversed_items_turned_round() -> None:
+    questionnaire = made(
+        {"kind": "likert", **SCALE, "subscale": "trust"},
+        {"kind": "likert", **SCALE, "subscale": "trust", "reversed": True},
+        {**SLIDER, "subscale": "load"},
+        {"kind": "likert", **SCALE},
+    )
+    answers = {"q0": 6, "q1": 1, "q2": 40, "q3": 2}
+    assert subscale_scores(questionnaire, answers) == {"trust": 6.5, "load": 40}
+    assert subscale_scores(questionnaire, {**answers, "q1": None})["trust"] is None
+
+
+def test_items_in_random_order_stay_behind_what_they_depend_on() -> None:
+    questionnaire = made(
+        *({"kind": "likert", **SCALE} for _ in range(4)),
+        {"kind": "single_choice", "options": OPTIONS},
+        {"kind": "short_text", "when": {"item": "q4", "any_of": ["yes"]}},
+    ).model_copy(update={"order": "random"})
+    orders = {tuple(item_order(questionnaire, np.random.default_rng(seed))) for seed in range(200)}
+    assert len(orders) > 60
+    for order in orders:
+        assert sorted(order) == [f"q{n}" for n in range(6)]
+        assert order.index("q5") == order.index("q4") + 1
+        arranged = questionnaire.arranged(order)
+        form = {"q4": ["no"], **{f"q{n}": ["3"] for n in range(4)}}
+        assert validate_answers(arranged, form)[1] == {}
+    fixed = questionnaire.model_copy(update={"order": "fixed"})
+    assert item_order(fixed, np.random.default_rng(0)) == [f"q{n}" for n in range(6)]
+
+
+def test_nasa_tlx_has_six_scales_of_twenty_one_gradations_and_fifteen_pairs() -> None:
+    """Hart and Staveland (1988); the paper and pencil form, version 1.0."""
+    tlx = load_questionnaire(ROOT / "questionnaires" / "nasa-tlx.yaml").value
+    assert [item.id for item in tlx.items] == [
+        *("mental_demand", "physical_demand", "temporal_demand", "performance", "effort", "frustration")
+    ]
+    for item in tlx.items:
+        assert item.kind == "slider"
+        assert (item.max - item.min) / item.step + 1 == 21
+    assert (tlx.items[3].low_label, tlx.items[3].high_label) == ("Perfect", "Failure")
+    assert subscale_scores(tlx, {item.id: 20 * n for n, item in enumerate(tlx.items)}) == {"workload": 50}
+    weights = load_questionnaire(ROOT / "questionnaires" / "nasa-tlx-weights.yaml").value
+    pairs = {frozenset(option.value for option in item.options) for item in weights.items}  # type: ignore[union-attr]
+    assert len(pairs) == 15
+    assert {name for pair in pairs for name in pair} == {item.id.replace("_", "-") for item in tlx.items}
+
+
+def test_the_fluency_scale_has_the_published_subscales() -> None:
+    """Hoffman (2019): fluency 3, relative contribution 4 (two reversed), trust, traits, improvement."""
+    scale = load_questionnaire(ROOT / "questionnaires" / "fluency.yaml").value
+    counts: dict[str, int] = {}
+    for item in scale.items:
+        assert item.kind == "likert"
+        counts[item.subscale] = counts.get(item.subscale, 0) + 1
+    assert counts == {"fluency": 3, "contribution": 4, "trust": 2, "traits": 2, "improvement": 2}
+    assert {item.id for item in scale.items if getattr(item, "reversed", False)} == {
+        "carried_weight",
+        "human_important",
+    }
