@@ -12,7 +12,19 @@ from numpy.typing import NDArray
 
 from galley.errors import GalleyError
 from galley.kitchen import Kitchen, Layout
-from galley.kitchen.trajectory import Seat, Trajectory, from_text, play, read, replay, start, to_text, write
+from galley.kitchen.codes import TICK
+from galley.kitchen.trajectory import (
+    Seat,
+    Trajectory,
+    episodes_of,
+    from_text,
+    play,
+    read,
+    replay,
+    start,
+    to_text,
+    write,
+)
 from tests.kitchen.strategies import joint_actions, situations
 
 ROOM = Layout.from_ascii("room", "XPTXX\nO1 2S\nXDXXX", horizon_ticks=10)
@@ -52,6 +64,38 @@ def test_files(tmp_path: Path) -> None:
 def test_events_of_a_replay() -> None:
     found = [(event.tick, event.seat, event.kind) for event in play(ROOM, ACTIONS).events()]
     assert found == [(0, 0, "blocked"), (1, 0, "pick_up"), (1, 1, "blocked")]
+
+
+@pytest.mark.parametrize(
+    ("ticks", "count", "lengths"),
+    [
+        (0, 2, [0]),
+        (9, 2, [9]),
+        (10, 2, [10]),
+        (11, 2, [10, 1]),
+        (25, 3, [10, 10, 5]),
+        (25, 2, [10, 15]),
+        (12, 1, [12]),
+    ],
+)
+def test_a_round_is_cut_where_its_episodes_end(ticks: int, count: int, lengths: list[int]) -> None:
+    actions = np.random.default_rng(1).integers(0, 6, (ticks, 2)).astype(np.uint8)
+    found = episodes_of(Trajectory(ROOM, actions, EPISODE.seats, 7), count)
+    assert [len(one.joint_actions) for one in found] == lengths
+    np.testing.assert_array_equal(np.concatenate([one.joint_actions for one in found]), actions)
+    assert {(one.seats, one.seed) for one in found} == {(EPISODE.seats, 7)}
+    replays = [play(ROOM, one.joint_actions).to_its_end() for one in found]
+    assert [one.ticks for one in replays] == [len(one.out) for one in replays]
+    assert [one.ticks for one in replays] == [min(length, 10) for length in lengths]
+
+
+def test_an_episode_that_began_elsewhere_ends_sooner() -> None:
+    state = start(ROOM)
+    state[TICK] = 7
+    actions = np.full((6, 2), 4, dtype=np.uint8)
+    found = episodes_of(Trajectory(ROOM, actions, initial=state), 2)
+    assert [len(one.joint_actions) for one in found] == [3, 3]
+    assert found[1].initial is None
 
 
 def changed(line: int, text: str) -> str:

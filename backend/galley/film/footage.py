@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 from galley.errors import GalleyError
 from galley.film.sizes import BOB_TILES, BUMP_MS, BUMP_TILES, EFFECT_MS, HATS, TOWARDS
-from galley.kitchen.codes import TICK
 from galley.kitchen.events import Event
 from galley.kitchen.layout import Layout
 from galley.kitchen.state import KitchenView, view
@@ -50,12 +49,13 @@ def footage(
 ) -> Footage:
     """What there is to film of the episodes of one round; `hats` by seat, None for a usual one.
 
-    Raises: GalleyError, which calls the round `shown`, if nothing of it was played.
+    Raises:
+        GalleyError: nothing of the round, which the message calls `shown`, was played.
     """
     seats = trajectories[0].seats
     drawn = tuple(seat for seat, who in enumerate(seats) if who.kind != NOBODY.kind)
     humans = [seat for seat, who in enumerate(seats) if who.kind == "human"]
-    played = tuple(_played(one) for one in trajectories)
+    played = tuple(play(one.layout, one.joint_actions, one.initial).to_its_end() for one in trajectories)
     one, other = hats
     first = one if one in HATS else _spare(other)
     second = other if other in HATS else _spare(first)
@@ -67,13 +67,6 @@ def footage(
 def _spare(other: str | None) -> str:
     """A usual hat that the other chef does not wear."""
     return next(hat for hat in USUAL_HATS if hat != other)
-
-
-def _played(trajectory: Trajectory) -> Replay:
-    """The episode run again, as far as its clock ran: a finished kitchen does not change."""
-    whole = play(trajectory.layout, trajectory.joint_actions, trajectory.initial)
-    ticks = int(whole.states[-1, TICK] - whole.states[0, TICK])
-    return Replay(whole.layout, whole.states[: ticks + 1], whole.out[:ticks])
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ and the state to start from if it is not the layout's own. Then one line a tick:
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final, TypeGuard
 
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from galley.errors import GalleyError
-from galley.kitchen.codes import ACTIONS
+from galley.kitchen.codes import ACTIONS, TICK
 from galley.kitchen.events import Event, decode
 from galley.kitchen.layout import Layout
 from galley.kitchen.rules import classic as rules
@@ -74,6 +74,15 @@ class Replay:
     states: NDArray[np.int16]
     out: NDArray[np.int32]
 
+    @property
+    def ticks(self) -> int:
+        """How many ticks its clock ran: a kitchen whose episode is over does not change any more."""
+        return int(self.states[-1, TICK] - self.states[0, TICK])
+
+    def to_its_end(self) -> Replay:
+        """The same without the joint actions that came after the episode was over."""
+        return Replay(self.layout, self.states[: self.ticks + 1], self.out[: self.ticks])
+
     def events(self) -> tuple[Event, ...]:
         """All events of the episode in order."""
         found: list[Event] = []
@@ -104,6 +113,24 @@ def play(
 def replay(trajectory: Trajectory) -> NDArray[np.int16]:
     """int16[T+1,S]: every state of the episode, the first before its first tick."""
     return play(trajectory.layout, trajectory.joint_actions, trajectory.initial).states
+
+
+def episodes_of(whole: Trajectory, count: int) -> tuple[Trajectory, ...]:
+    """The episodes of a round whose joint actions are one after the other in `whole`: from 1 to `count`.
+
+    Each ends where its kitchen's clock stops, and the next begins at the layout's start; the last keeps
+    all that is left, even what came after its end.
+    """
+    found = []
+    rest = whole
+    while len(found) + 1 < count:
+        begun = rest.joint_actions[: rest.layout.rules.horizon_ticks]
+        ticks = play(rest.layout, begun, rest.initial).ticks
+        if len(rest.joint_actions) <= ticks:
+            break
+        found.append(replace(rest, joint_actions=rest.joint_actions[:ticks]))
+        rest = replace(rest, joint_actions=rest.joint_actions[ticks:], initial=None)
+    return (*found, rest)
 
 
 def to_text(trajectory: Trajectory) -> str:
@@ -151,7 +178,7 @@ def from_text(text: str, shown: str) -> Trajectory:
 
 
 def write(trajectory: Trajectory, path: Path) -> None:
-    """Nothing; afterwards `read(path)` gives the trajectory back."""
+    """Write the trajectory so that `read(path)` gives it back."""
     path.write_text(to_text(trajectory), encoding="utf-8")
 
 

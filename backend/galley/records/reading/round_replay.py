@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from galley.errors import GalleyError
 from galley.kitchen import Layout
-from galley.kitchen.codes import DELIVERIES, ORDERS_DELIVERED, OUT_REWARD, TICK
+from galley.kitchen.codes import DELIVERIES, ORDERS_DELIVERED, OUT_REWARD
 from galley.kitchen.events import Event
 from galley.kitchen.measures import Measures, measures_of
-from galley.kitchen.trajectory import HUMAN, NOBODY, Replay, Seat, Trajectory, play
+from galley.kitchen.trajectory import HUMAN, NOBODY, Replay, Seat, Trajectory, episodes_of, play
 from galley.records.rows import RoundRow, SeatRow
 from galley.study.written.study_file import ALONE_AGENT
 
@@ -82,28 +82,15 @@ def state_bytes(state: NDArray[np.int16]) -> bytes:
 def trajectories_of(row: RoundRow) -> tuple[Trajectory, ...]:
     """The trajectories of a stored round's episodes, as far as they were played; at least one.
 
-    Raises: GalleyError if what is stored is no layout or no action.
+    Raises:
+        GalleyError: what is stored is no layout or no action.
     """
     try:
         layout = Layout.from_dict(json.loads(row.layout_json))
         first, second = map(_seat, row.seats)
-        return tuple(
-            Trajectory(layout, actions, (first, second), row.seed) for actions in _episodes(layout, row)
-        )
+        return episodes_of(Trajectory(layout, row.joint_actions, (first, second), row.seed), row.episodes)
     except (ValueError, GalleyError) as error:
         raise GalleyError(f"round {row.id}: {error}") from None
-
-
-def _episodes(layout: Layout, row: RoundRow) -> Iterator[NDArray[np.uint8]]:
-    """The joint actions of each episode that began; the last may have more than it could play."""
-    rest = row.joint_actions
-    for _ in range(row.episodes - 1):
-        played = int(play(layout, rest[: row.horizon_ticks]).states[-1, TICK])
-        if len(rest) <= played:
-            break
-        yield rest[:played]
-        rest = rest[played:]
-    yield rest
 
 
 def nobody(seat: SeatRow) -> bool:
@@ -120,7 +107,8 @@ def _seat(seat: SeatRow) -> Seat:
 def replay_round(row: RoundRow, ticks_stored: Sequence[int]) -> Replayed:
     """The round played again from its stored joint actions; `ticks_stored` are the numbers of its ticks.
 
-    Raises: GalleyError if what is stored is no layout or no action.
+    Raises:
+        GalleyError: what is stored is no layout or no action.
     """
     trajectories = trajectories_of(row)
     episodes = tuple(play(one.layout, one.joint_actions) for one in trajectories)
@@ -140,7 +128,7 @@ def _misnumbered(ticks: Sequence[int]) -> list[str]:
 def _wrong_length(row: RoundRow, episodes: Sequence[Replay]) -> list[str]:
     last = episodes[-1]
     stored = len(last.out)
-    played = int(last.states[-1, TICK])  # the clock stands still once the episode is over
+    played = last.ticks
     which = f" of episode {len(episodes)}" if row.episodes > 1 else ""
     if stored > played:
         return [f"{stored} ticks{which} are stored, yet the episode is over after {played}"]

@@ -2,38 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from galley.kitchen import Layout
-from galley.kitchen.codes import DELIVERIES, TICK
+from galley.kitchen.codes import DELIVERIES
 from galley.kitchen.events import decode
 from galley.kitchen.trajectory import Replay, play
 from galley.protocol.scene import Scene, happenings
 from galley.records import RoundRow
-from galley.records.reading.round_replay import nobody
+from galley.records.reading.round_replay import nobody, trajectories_of
 
 NO_HAT = "orange"
-
-
-def episodes(layout: Layout, joint_actions: NDArray[np.uint8], count: int) -> tuple[Replay, ...]:
-    """The episodes that `joint_actions` uint8[T,2] make one after the other, at most `count`; at least one.
-
-    A finished kitchen does not change, so its clock tells how many actions were its own.
-    """
-    found = []
-    left = joint_actions
-    while True:
-        whole = play(layout, left)
-        ticks = int(whole.states[-1, TICK])
-        found.append(Replay(layout, whole.states[: ticks + 1], whole.out[:ticks]))
-        left = left[ticks:]
-        if not len(left) or ticks == 0 or len(found) == count:
-            return tuple(found)
 
 
 def replay_document(row: RoundRow, ticks: Mapping[int, Mapping[str, Any]], after: int = 0) -> dict[str, Any]:
@@ -42,14 +21,16 @@ def replay_document(row: RoundRow, ticks: Mapping[int, Mapping[str, Any]], after
     `ticks` are the stored rows by number. Keyframes and ticks are those of the play socket
     (docs/protocol.md); beside each tick stand both actions and why the agent's was not its own, if so.
     """
-    layout = Layout.from_dict(json.loads(row.layout_json))
+    trajectories = trajectories_of(row)
+    layout = trajectories[0].layout
     scene = Scene(layout)
     hats = [seat.hat or NO_HAT for seat in row.seats]
     human = next((seat.seat for seat in row.seats if seat.agent is None), 0)
     frames: list[dict[str, Any]] = []
     steps: list[dict[str, Any]] = []
     first, score = 0, 0
-    for replay in episodes(layout, row.joint_actions, row.episodes):
+    for one in trajectories:
+        replay = play(layout, one.joint_actions).to_its_end()
         frames.append({"at": first, "board": _keyframe(row, scene, replay, hats, human, score)})
         for number in range(max(0, after - first), len(replay.out)):
             before, now, out = replay.states[number], replay.states[number + 1], replay.out[number]

@@ -56,8 +56,19 @@ class Course:
         self.kitchen.step(first, second)
         self.ticks += 1
 
+    def take_up(self, joint_actions: NDArray[np.uint8]) -> None:
+        """Play what was played of an episode (uint8 [T, 2]); if it is over, the next begins, if any."""
+        for first, second in joint_actions.tolist():
+            self.step(first, second)
+        if self.between:
+            self.next_episode()
+
     def next_episode(self) -> None:
-        """Begin the next episode. Raises: ValueError when none follows."""
+        """Begin the next episode.
+
+        Raises:
+            ValueError: none follows.
+        """
         if not self.between:
             raise ValueError("no episode follows now")
         self.score_before = self.score

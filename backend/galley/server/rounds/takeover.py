@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from galley.agents.bundle import Bundle
 from galley.agents.protocol import Agent
 from galley.kitchen import Layout
+from galley.kitchen.trajectory import Trajectory, episodes_of
 from galley.server.rounds.episodes import Course
 from galley.server.rounds.thinking import Unable
 
@@ -20,12 +21,8 @@ LOG = logging.getLogger(__name__)
 def caught_up(layout: Layout, episodes: int, joint_actions: NDArray[np.uint8]) -> Course:
     """The kitchen after the joint actions (uint8 [T, 2]) of all episodes so far."""
     course = Course(layout, episodes)
-    for first, second in joint_actions.tolist():
-        if course.between:
-            course.next_episode()
-        course.step(first, second)
-    if course.between:
-        course.next_episode()
+    for episode in episodes_of(Trajectory(layout, joint_actions), episodes):
+        course.take_up(episode.joint_actions)
     return course
 
 
