@@ -26,9 +26,9 @@ from numpy.typing import NDArray
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
+from galley.agents.batch import act_all  # noqa: E402
 from galley.agents.choosing import choose, draws_for  # noqa: E402
 from galley.agents.network import Network, NetworkAgent  # noqa: E402
-from galley.agents.together import act_together  # noqa: E402
 from galley.kitchen import Encoder, KitchenBatch, Layout  # noqa: E402
 from galley.kitchen.layout_file import load_layout  # noqa: E402
 from tests.agents.admission.newcomers import cole_policy  # noqa: E402
@@ -68,7 +68,7 @@ class Rounds:
         for start in range(0, ROUNDS, batch):
             some = slice(start, start + batch)
             agents = self.agents[some]
-            actions += act_together(agents, states[some], [self.tick] * len(agents))
+            actions += act_all(agents, states[some], [self.tick] * len(agents))
         return actions
 
     def step(self, actions: list[int]) -> None:
@@ -136,7 +136,7 @@ def waits_ms(rounds: Rounds, batch: int) -> NDArray[np.float64]:
         while time.perf_counter() - begin < 4 * SPAN_S:
             time.sleep(0.005)
             start = time.perf_counter()
-            act_together(rounds.agents[:batch], states, [rounds.tick] * batch)
+            act_all(rounds.agents[:batch], states, [rounds.tick] * batch)
             times.append(1000 * (time.perf_counter() - start))
     finally:
         for process in busy:

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from galley.agents.batch import act_all
 from galley.agents.network import NetworkAgent
 from galley.agents.protocol import Agent
 from galley.agents.scripted import Random, Stay
-from galley.agents.together import act_together
 from galley.errors import GalleyError
 from galley.kitchen import NORTH, SOUTH, STAY, Kitchen, KitchenBatch, Layout
 from tests.agents.policies import ROOM, bundle, linear_policy, summing_policy
@@ -84,14 +84,13 @@ def test_a_recurrent_policy_moves_on_with_what_it_observes(tmp_path: Path) -> No
     here = start()
     before = policy.act(here, 0)
     assert policy.act(here, 0) == before  # asking again changes nothing
-    assert policy.memory is not None
-    assert not policy.memory.any()
+    assert policy.alone.memories is not None
+    assert not policy.alone.memories.any()
     policy.observe(here, (STAY, STAY))
-    assert policy.memory is not None
-    seen = policy.encoder.seat(here[None], 0)[0]
-    assert np.array_equal(policy.memory, seen)
+    seen = policy.alone.encoder.seat(here[None], 0)
+    assert np.array_equal(policy.alone.memories, seen)
     policy.observe(here, (STAY, STAY))  # never asked in this tick, as when a round is taken over
-    assert np.array_equal(policy.memory, 2 * seen)
+    assert np.array_equal(policy.alone.memories, 2 * seen)
 
 
 POLICIES: list[Callable[[], bytes]] = [linear_policy, summing_policy]
@@ -119,7 +118,7 @@ def test_many_together_act_as_each_alone(tmp_path: Path, policy: Callable[[], by
     kitchens = KitchenBatch(ROOM, len(together))
     for tick in range(60):
         states = list(kitchens.states.copy())
-        actions = act_together(together, states, [tick] * len(together))
+        actions = act_all(together, states, [tick] * len(together))
         assert actions == [agent.act(state, tick) for agent, state in zip(alone, states, strict=True)]
         joints = [(action, 4) if number % 2 == 0 else (4, action) for number, action in enumerate(actions)]
         for group in pairs:

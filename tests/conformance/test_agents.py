@@ -10,10 +10,10 @@ import pytest
 from numpy.typing import NDArray
 
 from galley.agents.admission.trial import trial
+from galley.agents.batch import act_all
 from galley.agents.bundle import Bundle
 from galley.agents.catalogue import Catalogue
 from galley.agents.protocol import Agent
-from galley.agents.together import act_together
 from galley.kitchen import STAY, Kitchen, Layout
 from galley.kitchen.layout_file import find_layout
 from galley.workspace import Workspace
@@ -93,7 +93,7 @@ def test_many_at_once_act_as_each_alone(name: str, layout_name: str) -> None:
     for tick in range(TICKS):
         states = [record[tick][0] for record in records]
         joints = [record[tick][1] for record in records]
-        assert act_together(agents, states, [tick] * 3) == [joint[1] for joint in joints]
+        assert act_all(agents, states, [tick] * 3) == [joint[1] for joint in joints]
         for agent, state, joint in zip(agents, states, joints, strict=True):
             agent.observe(state, joint)
 

@@ -95,5 +95,5 @@ def test_a_memory_never_takes_in_what_is_no_number(tmp_path: Path) -> None:
         agent.observe(BAD, (STAY, STAY))
     assert agent.act(GOOD, 2) == 0
     agent.observe(GOOD, (STAY, STAY))
-    assert agent.memory is not None
-    assert agent.memory.tolist() == [2.0]
+    assert agent.alone.memories is not None
+    assert agent.alone.memories.tolist() == [[2.0]]

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -12,6 +11,7 @@ import onnxruntime as ort
 from numpy.typing import NDArray
 
 from galley.agents.choosing import choose, draws_for
+from galley.agents.unstuck import Unstuck
 from galley.errors import GalleyError
 from galley.kitchen import ACTIONS, Encoder, Layout
 
@@ -120,17 +120,50 @@ class Network:
         return tuple(inputs["state_in"].shape[1:]) if recurrent else None
 
 
-class NetworkAgent:
-    """An agent that follows a network; `networks` gives the network and encoder for a layout.
+class NetworkAgents:
+    """B agents that follow one network on one seat of B kitchens, from the beginning of an episode.
 
-    Unstuck rule: with `unstuck_after_ticks` = N, once at least N + 1 own ticks are on record and cell and
-    facing equal those of each of the last N ticks, the actions taken in those N ticks get probability 0.
-
-    Source: the human models of Carroll et al. 2019 (arXiv:1910.05789), N = 3.
+    There is one for each of `seeds`; all have the same unstuck rule (see `Unstuck`) or, with None, none.
     """
 
-    network: Network
-    encoder: Encoder
+    def __init__(
+        self,
+        network: Network,
+        encoder: Encoder,
+        sampling: Sampling,
+        unstuck_after_ticks: int | None,
+        seat: int,
+        seeds: Sequence[int],
+    ) -> None:
+        self.network, self.encoder, self.sampling = network, encoder, sampling
+        self.seats = np.full(len(seeds), seat, dtype=np.int64)
+        self.seeds = np.array([seed & _WORD for seed in seeds], dtype=np.uint64)
+        start = network.start()
+        self.memories = None if start is None else np.repeat(start[None], len(seeds), axis=0)
+        self.ahead: tuple[NDArray[np.int16], NDArray[np.float32]] | None = None
+        self.unstuck = None if unstuck_after_ticks is None else Unstuck(unstuck_after_ticks, seat, len(seeds))
+
+    def act(self, states: NDArray[np.int16], tick: int) -> NDArray[np.int64]:
+        """int64 [B]: the actions drawn from (or most probable under) the policy in states int16 [B, S]."""
+        return decide([self], states, np.full(len(states), tick, dtype=np.int64))
+
+    def observe(self, states: NDArray[np.int16], joint_actions: NDArray[np.integer]) -> None:
+        """Note what was done (integer [B, 2]) in these states; a recurrent policy moves its memory on."""
+        if self.unstuck is not None:
+            self.unstuck.note(states, joint_actions)
+        if self.memories is None:
+            return
+        if self.ahead is None or not np.array_equal(self.ahead[0], states):
+            _logits([self], states, self.seats)
+        if self.ahead is not None:
+            self.memories, self.ahead = self.ahead[1], None
+
+
+class NetworkAgent:
+    """An agent that follows a network; `networks` gives the network and encoder for a layout."""
+
+    alone: NetworkAgents
+    """This agent as a batch of one, begun by `reset`."""
 
     def __init__(
         self,
@@ -148,68 +181,68 @@ class NetworkAgent:
         Raises:
             GalleyError: there is no network for it.
         """
-        self.network, self.encoder = self._networks(layout)
-        self.seat, self.seed = seat, seed
-        self.memory = self.network.start()
-        self.ahead: tuple[bytes, NDArray[np.float32]] | None = None
-        self._ticks_seen = 0
-        self._past: deque[tuple[int, int, int]] = deque(maxlen=self.unstuck_after_ticks or 1)
+        network, encoder = self._networks(layout)
+        self.alone = NetworkAgents(network, encoder, self.sampling, self.unstuck_after_ticks, seat, (seed,))
 
     def act(self, state: NDArray[np.int16], tick: int) -> int:
         """The action drawn from (or most probable under) the policy."""
-        return act_as_one([self], [state], [tick])[0]
+        return int(self.alone.act(state[None], tick)[0])
 
     def observe(self, state: NDArray[np.int16], joint_action: tuple[int, int]) -> None:
-        """Note own cell, facing and action; a recurrent policy moves its state on."""
-        cell, facing = state[3 * self.seat : 3 * self.seat + 2].tolist()
-        self._past.append((cell, facing, int(joint_action[self.seat])))
-        self._ticks_seen += 1
-        if self.memory is None:
-            return
-        if self.ahead is None or self.ahead[0] != state.tobytes():
-            act_as_one([self], [state], [0])
-        if self.ahead is not None:
-            self.memory, self.ahead = self.ahead[1], None
+        """Note what was done; a recurrent policy moves its memory on."""
+        self.alone.observe(state[None], np.array([joint_action]))
+
+    def beside(self, seeds: Sequence[int]) -> NetworkAgents:
+        """An agent like this one for each seed, on its layout and seat, at the beginning of an episode."""
+        one = self.alone
+        return NetworkAgents(
+            one.network, one.encoder, self.sampling, self.unstuck_after_ticks, int(one.seats[0]), seeds
+        )
 
     def companions(self) -> object:
-        """Agents of one network and layout can be run together."""
-        return (id(self.network), id(self.encoder), self.sampling)
-
-    def taken_while_stuck(self, state: NDArray[np.int16]) -> list[int]:
-        """The actions of the last N ticks if cell and facing are still those of all of them, else none."""
-        after = self.unstuck_after_ticks
-        if after is None or self._ticks_seen < after + 1:
-            return []
-        cell, facing = state[3 * self.seat : 3 * self.seat + 2].tolist()
-        if any(past[0] != cell or past[1] != facing for past in self._past):
-            return []
-        return [past[2] for past in self._past]
+        """What agents have in common that can be run together: network, encoder and sampling."""
+        return (id(self.alone.network), id(self.alone.encoder), self.sampling)
 
 
-def act_as_one(
-    twins: Sequence[NetworkAgent], states: Sequence[NDArray[np.int16]], ticks: Sequence[int]
-) -> list[int]:
-    """The actions of agents with equal companions from one run of their network."""
-    first = twins[0]
-    seats = np.array([twin.seat for twin in twins], dtype=np.int64)
-    observations = first.encoder.seat(np.stack(states), seats).astype(np.float32)
-    memories = None
-    if first.network.recurrent:
-        memories = np.stack([twin.memory for twin in twins if twin.memory is not None])
-    logits, following = first.network.run(observations, memories)
-    if following is not None:
-        for twin, state, memory in zip(twins, states, following, strict=True):
-            twin.ahead = (state.tobytes(), memory)
+def decide(
+    members: Sequence[NetworkAgents], states: NDArray[np.int16], ticks: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """int64 [B]: the actions of the agents of all members, from one run of the network that they share.
+
+    Their states (int16 [B, S]) and ticks (int64 [B]) stand one after the other, as the members do.
+    """
+    seats = np.concatenate([member.seats for member in members])
+    logits = _logits(members, states, seats)
     barred = np.zeros(logits.shape, dtype=np.bool_)
-    for row, (twin, state) in enumerate(zip(twins, states, strict=True)):
-        if taken := twin.taken_while_stuck(state):
-            barred[row, taken] = True
+    for member, rows in _rows(members):
+        if member.unstuck is not None:
+            member.unstuck.bar(states[rows], barred[rows])
     draws = None
-    if first.sampling == "sample":
-        seeds = np.array([twin.seed & _WORD for twin in twins], dtype=np.uint64)
-        draws = draws_for(seeds, seats, np.array(ticks, dtype=np.int64))
-    actions: list[int] = choose(logits, barred, draws).tolist()
-    return actions
+    if members[0].sampling == "sample":
+        draws = draws_for(np.concatenate([member.seeds for member in members]), seats, ticks)
+    return choose(logits, barred, draws)
+
+
+def _logits(
+    members: Sequence[NetworkAgents], states: NDArray[np.int16], seats: NDArray[np.int64]
+) -> NDArray[np.float32]:
+    """float32 [B, 6]; members with a memory know afterwards what it will be once they observe."""
+    first = members[0]
+    observations = first.encoder.seat(states, seats).astype(np.float32)
+    memories = [member.memories for member in members if member.memories is not None]
+    logits, following = first.network.run(observations, np.concatenate(memories) if memories else None)
+    if following is not None:
+        seen = states.copy()
+        for member, rows in _rows(members):
+            member.ahead = seen[rows], following[rows]
+    return logits
+
+
+def _rows(members: Sequence[NetworkAgents]) -> Iterator[tuple[NetworkAgents, slice]]:
+    """Each member with its rows of the arrays of all."""
+    start = 0
+    for member in members:
+        yield member, slice(start, start := start + len(member.seats))
 
 
 def _misfit(what: str, found: Sequence[object], wanted: Sequence[int]) -> list[str]:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from galley.agents.batch import batch_of
 from galley.agents.bundle import Bundle
-from galley.agents.crew import crew
 from galley.kitchen import KitchenBatch, Layout
 
 
@@ -53,13 +53,13 @@ def play(a: Bundle, b: Bundle, layout: Layout, games: int, seed: int) -> tuple[P
 def play_in_seats(seats: tuple[Bundle, Bundle], layout: Layout, seeds: Sequence[int]) -> PlayResult:
     """The result of one game per seed, all played side by side to their ends."""
     kitchens = KitchenBatch(layout, len(seeds))
-    crews = [crew(bundle, layout, seat, seeds) for seat, bundle in enumerate(seats)]
+    batches = [batch_of(bundle, layout, seat, seeds) for seat, bundle in enumerate(seats)]
     scores = np.zeros(len(seeds), dtype=np.int64)
     tick = 0
     while not kitchens.done.all():
         states = kitchens.states.copy()
-        actions = np.stack([agents.act(states, tick) for agents in crews], axis=1)
-        for agents in crews:
+        actions = np.stack([agents.act(states, tick) for agents in batches], axis=1)
+        for agents in batches:
             agents.observe(states, actions)
         scores += kitchens.step(actions)
         tick += 1

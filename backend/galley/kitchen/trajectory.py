@@ -121,7 +121,7 @@ def episodes_of(whole: Trajectory, count: int) -> tuple[Trajectory, ...]:
     Each ends where its kitchen's clock stops, and the next begins at the layout's start; the last keeps
     all that is left, even what came after its end.
     """
-    found = []
+    found: list[Trajectory] = []
     rest = whole
     while len(found) + 1 < count:
         begun = rest.joint_actions[: rest.layout.rules.horizon_ticks]

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from galley.agents.bundle import Bundle
 from galley.agents.protocol import Agent
-from galley.agents.together import act_together
 from galley.errors import GalleyError, InvalidFiles, Problem
 from galley.kitchen import ACTIONS, STAY, Kitchen, Layout
 
@@ -127,7 +126,7 @@ def _play(bundle: Bundle, layout: Layout, ticks: int) -> _Played:
 def _asked(agent: Agent, state: NDArray[np.int16], tick: int) -> tuple[Any, str | None]:
     """The agent's answer, and what is wrong with it."""
     try:
-        action = act_together([agent], [state], [tick])[0]
+        action = agent.act(state, tick)
     except GalleyError as error:
         return None, str(error)
     except Exception as error:  # whatever an agent raises, it is told and the trial goes on

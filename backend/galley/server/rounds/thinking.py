@@ -14,8 +14,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from galley.agents.batch import act_all
 from galley.agents.protocol import Agent
-from galley.agents.together import act_together
 from galley.kitchen import ACTIONS, Layout
 
 T = TypeVar("T")
@@ -187,7 +187,7 @@ class Thinking:
             return
         try:
             actions: list[Any] = list(
-                act_together(
+                act_all(
                     [question.mind.agent for question in questions],
                     [question.state for question in questions],
                     [question.tick for question in questions],

@@ -1,4 +1,4 @@
-"""A crew acts as its agents do one by one."""
+"""A batch acts as its agents do one by one."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from galley.agents.batch import OneByOne, batch_of
 from galley.agents.bundle import Bundle, load_bundle
-from galley.agents.crew import EachAlone, NetworkCrew, crew
-from galley.agents.network import NetworkAgent
+from galley.agents.network import NetworkAgent, NetworkAgents
 from galley.errors import GalleyError
 from galley.kitchen import KitchenBatch, Layout
 from galley.workspace import Workspace
@@ -37,12 +37,12 @@ def lingering() -> bytes:
         (summing_policy, "argmax", "none"),
     ],
 )
-def test_a_crew_acts_as_each_agent_alone(
+def test_a_batch_acts_as_each_agent_alone(
     tmp_path: Path, policy: Callable[[], bytes], sampling: str, unstuck: str, seat: int
 ) -> None:
     shared = bundle(tmp_path, policy(), sampling=sampling, unstuck=unstuck)
-    together = crew(shared, ROOM, seat, SEEDS)
-    assert isinstance(together, NetworkCrew)
+    together = batch_of(shared, ROOM, seat, SEEDS)
+    assert isinstance(together, NetworkAgents)
     alone = [shared.make() for _ in SEEDS]
     for agent, seed in zip(alone, SEEDS, strict=True):
         agent.reset(ROOM, seat, seed)
@@ -58,7 +58,10 @@ def test_a_crew_acts_as_each_agent_alone(
         ]
         for agent, state in zip(alone, states, strict=True):
             assert isinstance(agent, NetworkAgent)
-            barred += bool(agent.taken_while_stuck(state))
+            taken = np.zeros((1, 6), dtype=np.bool_)
+            if agent.alone.unstuck is not None:
+                agent.alone.unstuck.bar(state[None], taken)
+            barred += bool(taken.any())
         joint = np.stack([actions, others[tick]][:: 1 - 2 * seat], axis=1)
         together.observe(states, joint)
         for agent, state, (one, other) in zip(alone, states, joint.tolist(), strict=True):
@@ -72,8 +75,8 @@ def shipped(name: str) -> Bundle:
 
 
 def test_agents_without_a_network_are_asked_one_by_one() -> None:
-    together = crew(shipped("myopic"), ROOM, 0, [1, 2])
-    assert isinstance(together, EachAlone)
+    together = batch_of(shipped("myopic"), ROOM, 0, [1, 2])
+    assert isinstance(together, OneByOne)
     states = KitchenBatch(ROOM, 2).states
     actions = together.act(states, 0)
     alone = shipped("myopic").make()
@@ -82,7 +85,7 @@ def test_agents_without_a_network_are_asked_one_by_one() -> None:
     together.observe(states, np.stack([actions, actions], axis=1))
 
 
-def test_nobody_is_a_crew_and_unknown_layouts_are_told() -> None:
-    assert crew(shipped("human-bc"), ROOM, 0, []).act(KitchenBatch(ROOM, 0).states, 0).shape == (0,)
+def test_nobody_is_a_batch_and_unknown_layouts_are_told() -> None:
+    assert batch_of(shipped("human-bc"), ROOM, 0, []).act(KitchenBatch(ROOM, 0).states, 0).shape == (0,)
     with pytest.raises(GalleyError, match="human-bc does not know layout 'nowhere'"):
-        crew(shipped("human-bc"), Layout("nowhere", ROOM.grid), 0, [1])
+        batch_of(shipped("human-bc"), Layout("nowhere", ROOM.grid), 0, [1])
