@@ -11,6 +11,7 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from galley.errors import GalleyError
+from galley.files.whole import whole_path
 
 COLOURS: Final = ("#0072B2", "#D55E00", "#009E73", "#E69F00", "#56B4E9", "#CC79A7", "#F0E442", "#000000")
 """Source: Okabe and Ito 2008, "Color Universal Design"; the order is ours."""
@@ -46,7 +47,7 @@ _SETTINGS: Final[Any] = {
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Nothing; within it figures get our settings."""
+    """Give figures our settings within the block."""
     with mpl.rc_context(_SETTINGS):
         yield
 
@@ -57,7 +58,7 @@ def new_figure(height_mm: float, width_mm: float = PAGE_MM) -> Figure:
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Nothing; writes the figure as its file ends; the same figure gives the same file.
+    """Write the figure as its file ends; the same figure gives the same file.
 
     Raises:
         GalleyError: the file ends in something else than .svg, .pdf or .png.
@@ -65,12 +66,13 @@ def save(figure: Figure, path: Path) -> None:
     require_ending(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     dateless: dict[str, dict[str, Any]] = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}, ".png": {}}
-    with styled():
-        figure.savefig(path, dpi=PNG_DPI, metadata=dateless[path.suffix.lower()])
+    ending = path.suffix.lower()
+    with styled(), whole_path(path) as part:
+        figure.savefig(part, format=ending[1:], dpi=PNG_DPI, metadata=dateless[ending])
 
 
 def require_ending(path: Path) -> None:
-    """Nothing.
+    """Refuse a figure's file of another ending than `ENDINGS`.
 
     Raises:
         GalleyError: the file ends in something else than .svg, .pdf or .png.

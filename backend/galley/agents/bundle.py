@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 import pydantic
+from ruamel.yaml import YAML
 
 from galley.agents.network import Network, NetworkAgent, Sampling
 from galley.agents.protocol import Agent
 from galley.agents.scripted import Random, Stay
 from galley.errors import GalleyError, InvalidFiles, Problem
 from galley.files.reading import FileModel, Loaded, load
+from galley.files.whole import write_whole
 from galley.kitchen import ENCODINGS, Encoder, Layout
 from galley.names import name_fix
 from galley.planning.centralized import Centralized
@@ -43,6 +46,7 @@ _PLAIN: Final[Mapping[str, Callable[[], Agent]]] = {
 }
 """The policies without parameters."""
 
+DESCRIPTION_FILE: Final = "agent.yaml"
 _FILE: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 
 
@@ -52,11 +56,11 @@ class Description(FileModel):
     format: Literal[1]
     name: str
     kind: Kind
-    layouts: Literal["any"] | dict[str, str]
-    params: dict[str, str | int | float | bool] = pydantic.Field(default_factory=dict)
     encoding: str | None = None
     sampling: Sampling | None = None
     unstuck_after_ticks: Literal["none"] | Annotated[int, pydantic.Field(ge=1, le=100)] | None = None
+    params: dict[str, str | int | float | bool] = pydantic.Field(default_factory=dict)
+    layouts: Literal["any"] | dict[str, str]
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,13 +119,36 @@ class Bundle:
         )
 
 
+def describe_network(
+    folder: Path,
+    layouts: Iterable[str],
+    *,
+    encoding: str,
+    sampling: Sampling,
+    unstuck_after_ticks: int | None,
+) -> None:
+    """Write `agent.yaml` of a network whose `folder` holds `LAYOUT.onnx` for each of the layouts."""
+    description = Description(
+        format=1,
+        name=folder.name,
+        kind="network",
+        encoding=encoding,
+        sampling=sampling,
+        unstuck_after_ticks="none" if unstuck_after_ticks is None else unstuck_after_ticks,
+        layouts={layout: f"{layout}.onnx" for layout in layouts},
+    )
+    text = io.StringIO()
+    YAML().dump(description.model_dump(exclude_unset=True), text)
+    write_whole(folder / DESCRIPTION_FILE, text.getvalue())
+
+
 def load_bundle(folder: Path, shown: str) -> Bundle:
     """The agent in a folder; messages call the folder `shown`. Networks are loaded when first needed.
 
     Raises:
         InvalidFiles: everything that is wrong with agent.yaml and the files that it names.
     """
-    loaded = load(folder / "agent.yaml", Description, f"{shown}/agent.yaml")
+    loaded = load(folder / DESCRIPTION_FILE, Description, f"{shown}/{DESCRIPTION_FILE}")
     problems = [*_problems(loaded, folder)]
     if problems:
         raise InvalidFiles(problems)

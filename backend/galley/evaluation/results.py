@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
@@ -13,7 +14,7 @@ import numpy as np
 import pydantic
 
 from galley.errors import GalleyError
-from galley.files.whole_file import whole_file
+from galley.files.whole import write_whole
 
 Key = tuple[str, str, str]
 """Layout, the agent on seat 0, the agent on seat 1."""
@@ -111,8 +112,7 @@ class Results:
     def save(self, path: Path) -> None:
         """Nothing; writes all cells to `path` (JSON), whole or not at all."""
         text = json.dumps(_File(cells=list(self)).model_dump(), separators=(",", ":"))
-        with whole_file(path) as file:
-            file.write((text.replace('{"layout"', '\n{"layout"') + "\n").encode())
+        write_whole(path, text.replace('{"layout"', '\n{"layout"') + "\n")
 
     @classmethod
     def load(cls, path: Path) -> Results:
@@ -134,11 +134,11 @@ class Results:
 
     def save_csv(self, path: Path) -> None:
         """Nothing; writes one row a cell, with the columns of `CSV_COLUMNS`."""
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("w", encoding="utf-8", newline="") as file:
-            writer = csv.DictWriter(file, CSV_COLUMNS, lineterminator="\n")
-            writer.writeheader()
-            writer.writerows(_row(cell) for cell in self)
+        text = io.StringIO(newline="")
+        writer = csv.DictWriter(text, CSV_COLUMNS, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(_row(cell) for cell in self)
+        write_whole(path, text.getvalue())
 
 
 def _row(cell: Cell) -> dict[str, Any]:

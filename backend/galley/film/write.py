@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from galley.errors import GalleyError
+from galley.files.whole import whole_path
 from galley.film.footage import Footage, Reel
 
 if TYPE_CHECKING:
@@ -67,15 +68,11 @@ def write_film(footage: Footage, sprites: Path, out: Path, tile: int = USUAL_TIL
     Raises: GalleyError if the file cannot be written so; nothing is left of it then.
     """
     check(out, tile, speed)
-    part = out.with_name(f".{out.name}.part")
     try:
-        made = _WRITERS[out.suffix.lower()](footage, sprites, part, tile, speed)
-        part.replace(out)
+        with whole_path(out) as part:
+            return _WRITERS[out.suffix.lower()](footage, sprites, part, tile, speed)
     except OSError as error:
         raise GalleyError(f"{out}: {error.strerror or error}; name another file with --out") from None
-    finally:
-        part.unlink(missing_ok=True)
-    return made
 
 
 def _write_gif(footage: Footage, sprites: Path, out: Path, tile: int, speed: float) -> int:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from galley.errors import GalleyError
+from galley.files.whole import write_whole
 from galley.kitchen.codes import ACTIONS, TICK
 from galley.kitchen.events import Event, decode
 from galley.kitchen.layout import Layout
@@ -179,7 +180,7 @@ def from_text(text: str, shown: str) -> Trajectory:
 
 def write(trajectory: Trajectory, path: Path) -> None:
     """Write the trajectory so that `read(path)` gives it back."""
-    path.write_text(to_text(trajectory), encoding="utf-8")
+    write_whole(path, to_text(trajectory))
 
 
 def read(path: Path) -> Trajectory:

@@ -12,7 +12,7 @@ import torch
 from torch.utils.tensorboard import SummaryWriter
 
 from galley.errors import GalleyError
-from galley.files.whole_file import whole_file
+from galley.files.whole import whole_file, write_whole
 from galley.kitchen import Layout
 from galley.learning.ppo.policy import Policy
 from galley.names import name_fix
@@ -59,7 +59,7 @@ class RunFolder:
         else:
             (path / "members").mkdir(parents=True, exist_ok=True)
             told = {**asked, **origin(str(asked.get("device", "cpu")))}
-            _write(described, (json.dumps(told, indent=2, sort_keys=True) + "\n").encode())
+            write_whole(described, json.dumps(told, indent=2, sort_keys=True) + "\n")
 
     def load(self) -> dict[str, Any] | None:
         """The last state that was saved, None at the beginning of a run.
@@ -110,7 +110,7 @@ class RunFolder:
     def _write_log(self) -> None:
         lines = [",".join(COLUMNS)]
         lines += [",".join(str(row[column]) for column in COLUMNS) for row in self._told]
-        _write(self._log, ("\n".join(lines) + "\n").encode())
+        write_whole(self._log, "\n".join(lines) + "\n")
 
     def _compare(self, described: Path, asked: Mapping[str, Any]) -> None:
         try:
@@ -184,8 +184,3 @@ def save_tensors(path: Path, content: Mapping[str, Any]) -> None:
     """Nothing; writes a file that `torch.load` reads, whole or not at all."""
     with whole_file(path) as file:
         torch.save(dict(content), file)
-
-
-def _write(path: Path, content: bytes) -> None:
-    with whole_file(path) as file:
-        file.write(content)

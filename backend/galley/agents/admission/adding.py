@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import shutil
-import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -14,9 +11,10 @@ import numpy as np
 
 from galley.agents.admission.card import card
 from galley.agents.admission.gate import Figures, gate, probabilities
-from galley.agents.bundle import load_bundle
+from galley.agents.bundle import describe_network, load_bundle
 from galley.agents.network import Network, Sampling
 from galley.errors import GalleyError, InvalidFiles, Problem
+from galley.files.whole import whole_folder
 from galley.kitchen import ENCODINGS, Encoder, Layout
 from galley.kitchen.layout_file import find_layout
 from galley.names import name_fix
@@ -36,7 +34,9 @@ class Converted:
 Convert = Callable[[Path, tuple[int, ...]], Converted]
 """From a file and the shape of one seat's observation to ONNX.
 
-Raises: GalleyError saying why it cannot be."""
+Raises:
+    GalleyError: why it cannot be.
+"""
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,8 @@ def add_network(workspace: Workspace, new: Newcomer, convert: Convert, *, replac
         InvalidFiles: every reason why it is not let in; `agents/` is as it was.
     """
     work = _Work()
-    place = workspace.folder("agents") / new.name
+    agents = workspace.folder("agents")
+    place = agents / new.name
     named = NAME.fullmatch(new.name) is not None
     if not named:
         told = f"'{new.name}' is no name for an agent"
@@ -92,14 +93,12 @@ def add_network(workspace: Workspace, new: Newcomer, convert: Convert, *, replac
         told = f"encoding '{new.encoding}' is unknown"
         work.problems.append(Problem("--encoding", None, told, name_fix(new.encoding, ENCODINGS)))
     _convert_all(workspace, new, convert, work)
-    with _staging(workspace.folder("agents")) as staging:
-        folder = staging / (new.name if named else "agent")
+    with whole_folder(place if named else agents / "agent", replace=replace) as folder:
         figures = _tried(folder, new, work)
         if work.problems:
             raise InvalidFiles(work.problems)
         (folder / "card.md").write_text(_card_text(new, work, figures), "utf-8")
         sha256 = load_bundle(folder, workspace.shown(place)).sha256
-        _move_in(folder, place, staging, replace)
     notes = {name: found.notes for name, found in work.converted.items()}
     return Added(new.name, place, sha256, tuple(figures), notes)
 
@@ -152,21 +151,15 @@ def _tried(folder: Path, new: Newcomer, work: _Work) -> list[Figures]:
     """The figures of all layouts that could be converted; the reasons to reject go to the problems."""
     if not work.converted:
         return []
-    folder.mkdir()
     for name, converted in work.converted.items():
         (folder / f"{name}.onnx").write_bytes(converted.content)
-    unstuck = "none" if new.unstuck_after_ticks is None else new.unstuck_after_ticks
-    lines = [
-        "format: 1",
-        f"name: {folder.name}",
-        "kind: network",
-        f"encoding: {new.encoding}",
-        f"sampling: {new.sampling}",
-        f"unstuck_after_ticks: {unstuck}",
-        "layouts:",
-        *(f"  {name}: {name}.onnx" for name in work.converted),
-    ]
-    (folder / "agent.yaml").write_text("\n".join(lines) + "\n", "utf-8")
+    describe_network(
+        folder,
+        work.converted,
+        encoding=new.encoding,
+        sampling=new.sampling,
+        unstuck_after_ticks=new.unstuck_after_ticks,
+    )
     bundle = load_bundle(folder, f"agents/{folder.name}")
     figures = []
     sources = dict(_by_layout(new.files, work))
@@ -199,28 +192,3 @@ def _card_text(new: Newcomer, work: _Work, figures: Sequence[Figures]) -> str:
         unstuck_after_ticks=new.unstuck_after_ticks,
         figures=figures,
     )
-
-
-@contextmanager
-def _staging(agents: Path) -> Iterator[Path]:
-    """A hidden folder beside the bundles, gone when the work is done."""
-    agents.mkdir(parents=True, exist_ok=True)
-    staging = Path(tempfile.mkdtemp(prefix=".adding-", dir=agents))
-    try:
-        yield staging
-    finally:
-        shutil.rmtree(staging, ignore_errors=True)
-
-
-def _move_in(folder: Path, place: Path, staging: Path, replace: bool) -> None:
-    """The staged folder takes its place; a former one of the name goes with the staging folder."""
-    former = staging / "former"
-    if replace and place.exists():
-        former.parent.mkdir(exist_ok=True)
-        place.rename(former)
-    try:
-        folder.rename(place)
-    except OSError as error:
-        if former.exists():
-            former.rename(place)
-        raise GalleyError(f"{place}: cannot be put there ({error.strerror or error})") from None

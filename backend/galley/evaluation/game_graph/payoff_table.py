@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from galley.errors import GalleyError
-from galley.files.whole_file import whole_file
+from galley.files.whole import whole_file
 
 _PARTS = ("names", "mean", "standard_error", "games")
 

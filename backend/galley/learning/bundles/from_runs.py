@@ -10,10 +10,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from galley.agents.bundle import Bundle, load_bundle
+from galley.agents.bundle import Bundle, describe_network, load_bundle
 from galley.agents.catalogue import Catalogue
 from galley.agents.play import play, play_in_seats
 from galley.errors import GalleyError
+from galley.files.whole import whole_folder
 from galley.kitchen import Encoder, Layout
 from galley.kitchen.layout_file import find_layout
 from galley.learning.bundles.filled_convolutions import filled
@@ -58,29 +59,38 @@ def export(
     layouts = [find_layout(place, one["layout"]) for one in asked]
     if len(set(layouts)) < len(layouts):
         raise GalleyError("two of the runs are of one layout; name one run for each layout")
-    folder = place.folder("agents") / name
-    folder.mkdir(parents=True, exist_ok=True)
-    facts = _facts(folder)
-    for run, one, layout in zip(runs, asked, layouts, strict=True):
-        policy = load_tensors(run / "members" / f"{member}.pt")
-        weights = {key: tensor.numpy() for key, tensor in policy.items()}
-        content = filled(grid_onnx(weights, Encoder(layout, ENCODING).shape))
-        (folder / f"{layout.name}.onnx").write_bytes(content)
-        begun = {key: str(one.pop(key, "")) for key in ORIGIN}
-        generation = int(member) if member.isdigit() and one["method"].startswith("cole") else None
-        facts[layout.name] = {"asked": one, **_made(run, generation), **begun, "member": member, "scores": {}}
-        pool = [Path(path) for path in one["pool"]]
-        facts[layout.name]["pool"] = [run_asked(path) for path in pool]
-        for made in map(_made, pool):
-            facts[layout.name]["ticks"] += made["ticks"]
-            facts[layout.name]["seconds"] += made["seconds"]
-    (folder / "agent.yaml").write_text(_description(name, list(facts), unstuck_after_ticks), "utf-8")
-    bundle = load_bundle(folder, folder.as_posix())
-    for layout in layouts:
-        facts[layout.name]["scores"] = _scores(place, bundle, layout, seed, tell)
-    (folder / FACTS).write_text(json.dumps(facts, indent=1, sort_keys=True) + "\n", "utf-8")
-    (folder / "card.md").write_text(training_card(name, facts, unstuck_after_ticks), "utf-8")
-    return load_bundle(folder, folder.as_posix())
+    home = place.folder("agents") / name
+    with whole_folder(home, replace=True, kept=True) as folder:
+        facts = _facts(folder)
+        for run, one, layout in zip(runs, asked, layouts, strict=True):
+            policy = load_tensors(run / "members" / f"{member}.pt")
+            weights = {key: tensor.numpy() for key, tensor in policy.items()}
+            content = filled(grid_onnx(weights, Encoder(layout, ENCODING).shape))
+            (folder / f"{layout.name}.onnx").write_bytes(content)
+            facts[layout.name] = _described(run, one, member)
+        describe_network(
+            folder, facts, encoding=ENCODING, sampling="sample", unstuck_after_ticks=unstuck_after_ticks
+        )
+        bundle = load_bundle(folder, home.as_posix())
+        for layout in layouts:
+            facts[layout.name]["scores"] = _scores(place, bundle, layout, seed, tell)
+        (folder / FACTS).write_text(json.dumps(facts, indent=1, sort_keys=True) + "\n", "utf-8")
+        (folder / "card.md").write_text(training_card(name, facts, unstuck_after_ticks), "utf-8")
+    return load_bundle(home, home.as_posix())
+
+
+def _described(run: Path, asked: dict[str, Any], member: str) -> dict[str, Any]:
+    """What `training.json` keeps of a run, but its scores; `asked` is what its run.json holds."""
+    wishes = {key: value for key, value in asked.items() if key not in ORIGIN}
+    begun = {key: str(asked.get(key, "")) for key in ORIGIN}
+    generation = int(member) if member.isdigit() and asked["method"].startswith("cole") else None
+    facts = {"asked": wishes, **_made(run, generation), **begun, "member": member}
+    pool = [Path(path) for path in asked["pool"]]
+    facts["pool"] = [run_asked(path) for path in pool]
+    for made in map(_made, pool):
+        facts["ticks"] += made["ticks"]
+        facts["seconds"] += made["seconds"]
+    return facts
 
 
 def _made(run: Path, generation: int | None = None) -> dict[str, Any]:
@@ -123,11 +133,3 @@ def _facts(folder: Path) -> dict[str, Any]:
     except ValueError as error:
         raise GalleyError(f"{path}: is no JSON ({error}); remove the folder and export again") from None
     return found
-
-
-def _description(name: str, layouts: Sequence[str], unstuck: int | None) -> str:
-    files = "\n".join(f"  {layout}: {layout}.onnx" for layout in layouts)
-    return (
-        f"format: 1\nname: {name}\nkind: network\nencoding: {ENCODING}\nsampling: sample\n"
-        f"unstuck_after_ticks: {'none' if unstuck is None else unstuck}\nlayouts:\n{files}\n"
-    )

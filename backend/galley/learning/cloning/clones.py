@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from galley.agents.bundle import load_bundle
+from galley.agents.bundle import describe_network, load_bundle
 from galley.agents.play import play_in_seats
 from galley.datasets.overcooked_games import HumanGame, human_games
 from galley.errors import GalleyError
+from galley.files.whole import whole_folder
 from galley.kitchen import Encoder, Layout
 from galley.kitchen.layout_file import find_layout
 from galley.learning.bundles.onnx_writing import dense_onnx
@@ -38,17 +39,6 @@ EPOCHS: Final[Mapping[str, int]] = {
 }
 """Passes per layout. Source: the published code of Carroll et al. 2019, clones of either split."""
 
-_DESCRIPTION: Final = """\
-format: 1
-name: {name}
-kind: network
-encoding: {encoding}
-sampling: sample
-unstuck_after_ticks: {unstuck}
-layouts:
-{layouts}
-"""
-
 
 def learn_bc(
     workspace: Path,
@@ -72,7 +62,7 @@ def learn_bc(
     """
     place = Workspace(workspace)
     path = find_pickle(data or place.path / ".cache" / "overcooked-ai", split)
-    folder = out or place.folder("agents") / BUNDLES[split]
+    home = out or place.folder("agents") / BUNDLES[split]
     recorded: dict[str, list[HumanGame]] = {}
     for game in human_games(path):
         recorded.setdefault(game.layout.name, []).append(game)
@@ -81,27 +71,29 @@ def learn_bc(
         raise GalleyError(
             f"{path}: holds no game on {' '.join(sorted(missing))}; use the file of version 1.1.0"
         )
-    folder.mkdir(parents=True, exist_ok=True)
-    clones = {}
-    for number, (name, epochs) in enumerate(EPOCHS.items()):
-        layout = find_layout(place, name)
-        observations, actions = cloning_rows(layout, recorded[name])
-        own_seed = int(np.random.SeedSequence((seed, number)).generate_state(1)[0])
-        clones[layout] = train_clone(observations, actions, CloningSettings(epochs=epochs), own_seed)
-        (folder / f"{name}.onnx").write_bytes(dense_onnx(clones[layout].layers))
-        tell(f"{name}: held-out accuracy {clones[layout].held_out_accuracy:.3f}")
-    _describe(folder, EPOCHS)
-    rows = _self_play(folder, clones, games, seed, tell)
-    text = card(
-        folder.name,
-        split=split,
-        seed=seed,
-        games=games,
-        data_file=path.name,
-        data_sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
-        rows=rows,
-    )
-    (folder / "card.md").write_text(text, "utf-8")
+    with whole_folder(home.resolve(), replace=True, kept=True) as folder:
+        clones = {}
+        for number, (name, epochs) in enumerate(EPOCHS.items()):
+            layout = find_layout(place, name)
+            observations, actions = cloning_rows(layout, recorded[name])
+            own_seed = int(np.random.SeedSequence((seed, number)).generate_state(1)[0])
+            clones[layout] = train_clone(observations, actions, CloningSettings(epochs=epochs), own_seed)
+            (folder / f"{name}.onnx").write_bytes(dense_onnx(clones[layout].layers))
+            tell(f"{name}: held-out accuracy {clones[layout].held_out_accuracy:.3f}")
+        describe_network(
+            folder, EPOCHS, encoding=ENCODING, sampling="sample", unstuck_after_ticks=UNSTUCK_AFTER_TICKS
+        )
+        rows = _self_play(folder, clones, games, seed, tell)
+        text = card(
+            folder.name,
+            split=split,
+            seed=seed,
+            games=games,
+            data_file=path.name,
+            data_sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
+            rows=rows,
+        )
+        (folder / "card.md").write_text(text, "utf-8")
     return rows
 
 
@@ -128,14 +120,6 @@ def cloning_rows(layout: Layout, games: Sequence[HumanGame]) -> tuple[NDArray[np
     observations = np.concatenate([both.transpose(1, 0, 2).reshape(-1, both.shape[2]) for both in seen])
     actions = np.concatenate([game.joint_actions.T.reshape(-1) for game in games])
     return observations.astype(np.float32), actions.astype(np.uint8)
-
-
-def _describe(folder: Path, layouts: Iterable[str]) -> None:
-    lines = "\n".join(f"  {layout}: {layout}.onnx" for layout in layouts)
-    text = _DESCRIPTION.format(
-        name=folder.name, encoding=ENCODING, unstuck=UNSTUCK_AFTER_TICKS, layouts=lines
-    )
-    (folder / "agent.yaml").write_text(text, "utf-8")
 
 
 def _self_play(

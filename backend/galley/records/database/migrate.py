@@ -14,9 +14,9 @@ from sqlalchemy.engine import URL
 from sqlalchemy.exc import DatabaseError
 
 from galley.errors import GalleyError
-from galley.files.serving_lock import ServingLock
 from galley.records.database.engine import connect, shown, sqlite_file
 from galley.records.database.retries import one_line
+from galley.records.database.serving_lock import serving_lock
 
 SCRIPTS = Path(__file__).parent / "migrations"
 # Any number that nothing else in the database locks; replicas that start together take turns.
@@ -38,7 +38,7 @@ def migrate(url: URL, *, locked: bool, scripts: Path = SCRIPTS) -> None:
         with engine.connect() as connection:
             if _is_current(connection, shown(url), directory):
                 return
-        with ServingLock(file) if file is not None and not locked else nullcontext():
+        with serving_lock(file) if file is not None and not locked else nullcontext():
             _upgrade(engine, shown(url), directory, config)
     except DatabaseError as error:
         raise GalleyError(f"{shown(url)}: cannot be opened as records: {one_line(error)}") from None

@@ -5,8 +5,10 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from pathlib import Path
+from types import TracebackType
 from typing import Any, ClassVar, Self
 
+from galley.files.whole import whole_path
 from galley.records.export.sheets import Sheet
 
 
@@ -19,7 +21,8 @@ class PartFile(ABC):
         self.sheet = sheet
         self.rows = 0
         self.path = folder / f"{sheet.name}.{self.ending}"
-        self.part = folder / f".{self.path.name}.part"
+        self._whole = whole_path(self.path)
+        self.part = self._whole.__enter__()
 
     @abstractmethod
     def write(self, values: Mapping[str, Any]) -> None:
@@ -32,9 +35,8 @@ class PartFile(ABC):
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         self.close()
-        if kind is None:
-            self.part.replace(self.path)
-        else:
-            self.part.unlink(missing_ok=True)
+        self._whole.__exit__(kind, error, trace)

@@ -10,6 +10,7 @@ from typing import Any, Final
 from sqlalchemy import Connection, func, select
 
 from galley.errors import GalleyError
+from galley.files.whole import write_whole
 from galley.records.database.tables import ABSENCES, ATTEMPTS, NOTES, RESPONSES, STAGES
 from galley.records.export.csv_file import CsvFile
 from galley.records.export.data_dictionary import dictionary_csv, dictionary_markdown
@@ -81,8 +82,8 @@ def export_study(
                 flagged = flags(connection, study)
                 for visit in queries.visits(connection, study, tests=include_test):
                     _Visit(connection, visit, files, wide, flagged.get(visit.id, ())).write()
-            (out / "data-dictionary.md").write_text(dictionary_markdown(), encoding="utf-8")
-            (out / "data-dictionary.csv").write_text(dictionary_csv(), encoding="utf-8", newline="")
+            write_whole(out / "data-dictionary.md", dictionary_markdown())
+            write_whole(out / "data-dictionary.csv", dictionary_csv())
         except OSError as error:
             raise GalleyError(f"{out}: {error.strerror or error}; name another folder with --out") from None
     return {file.path.name: file.rows for copies in files.values() for file in copies.files}

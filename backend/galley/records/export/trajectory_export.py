@@ -10,6 +10,7 @@ from pathlib import Path
 from sqlalchemy import Connection
 
 from galley.errors import GalleyError
+from galley.files.whole import whole_path
 from galley.kitchen.trajectory import to_text
 from galley.records.database.tables import TICKS
 from galley.records.export.csv_file import CsvFile
@@ -31,20 +32,20 @@ def export_trajectories(store: Store, study: str, out: Path, include_test: bool 
     Raises: GalleyError if nobody visited the study or the file cannot be written.
     """
     written = 0
-    part = out.with_name(f".{out.name}.part")
     try:
-        with store.reading() as connection, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
+        with (
+            store.reading() as connection,
+            whole_path(out) as part,
+            zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive,
+        ):
             for participant, row, found in _rounds(connection, store, study, include_test):
                 for number, trajectory in enumerate(found.trajectories, 1):
                     episode = f"-{number}" if row.episodes > 1 else ""
                     member = zipfile.ZipInfo(f"{participant}-{row.id}{episode}.jsonl", DATE)
                     archive.writestr(member, to_text(trajectory), zipfile.ZIP_DEFLATED)
                     written += 1
-        part.replace(out)
     except OSError as error:
         raise GalleyError(f"{out}: {error.strerror or error}; name another file with --out") from None
-    finally:
-        part.unlink(missing_ok=True)
     return written
 
 

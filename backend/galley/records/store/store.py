@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Self
 
 from galley.errors import GalleyError
-from galley.files.serving_lock import ServingLock
 from galley.records.database.engine import connect, database_url, shown, sqlite_file
 from galley.records.database.migrate import migrate
 from galley.records.database.retries import PATIENCE_S
+from galley.records.database.serving_lock import serving_lock
 from galley.records.database.writer import FLUSH_EVERY_S
 from galley.records.store.store_rounds import RoundStore
 from galley.records.store.store_visits import VisitStore
@@ -49,7 +49,7 @@ class Store(VisitStore, RoundStore):
         try:
             if file is not None:
                 file.parent.mkdir(parents=True, exist_ok=True)
-                lock = ServingLock(file) if serving else None
+                lock = serving_lock(file) if serving else None
             migrate(url, locked=lock is not None)
         except BaseException as error:
             if lock is not None:

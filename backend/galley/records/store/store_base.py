@@ -11,7 +11,7 @@ from typing import Literal, TypeVar
 
 from sqlalchemy import Connection, Engine
 
-from galley.files.serving_lock import ServingLock
+from galley.files.lock import FileLock
 from galley.records.database.retries import Patience, passes
 from galley.records.database.writer import Writer
 from galley.records.rows import Health
@@ -28,7 +28,7 @@ class StoreBase:
         name: str,
         engine: Engine,
         reader: Engine,
-        lock: ServingLock | None,
+        lock: FileLock | None,
         flush_s: float,
         patience_s: float,
     ) -> None:

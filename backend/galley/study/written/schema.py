@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from galley.agents.bundle import Description
 from galley.files.reading import FileModel
+from galley.files.whole import write_whole
 from galley.kitchen.layout_file import LayoutFile
 from galley.study.written.questionnaire import Questionnaire
 from galley.study.written.study_file import StudyFile
@@ -38,6 +39,6 @@ def write_schemas(folder: Path) -> tuple[Path, ...]:
     written = []
     for kind, schema in schemas().items():
         path = folder / f"{kind}.schema.json"
-        path.write_text(json.dumps(schema, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+        write_whole(path, json.dumps(schema, indent=2, ensure_ascii=False) + "\n")
         written.append(path)
     return tuple(written)

@@ -1,4 +1,4 @@
-"""One serving process per SQLite file."""
+"""A lock that one process at a time holds, by a file."""
 
 from __future__ import annotations
 
@@ -10,29 +10,28 @@ from typing import Self
 from galley.errors import GalleyError
 
 
-class ServingLock:
-    """Held from `ServingLock(file)` to `release()` or the death of the process, however it dies.
+class FileLock:
+    """Held from `FileLock(path, refusal)` to `release()` or the death of the process, however it dies.
 
-    Raises: GalleyError if another process, or another store of this one, holds it.
+    `refusal` is what the next one is told, with `{holder}` for the number of the process that holds it.
+
+    Raises:
+        GalleyError: another process, or another lock of this one, holds it.
     """
 
-    def __init__(self, file: Path) -> None:
-        path = file.with_name(file.name + "-serving")
+    def __init__(self, path: Path, refusal: str) -> None:
         self._descriptor: int | None = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
         try:
             fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             holder = os.read(self._descriptor, 32).decode(errors="replace").strip() or "unknown"
             self.release()
-            raise GalleyError(
-                f"{file}: process {holder} already serves this database; "
-                "stop it, name another file with --database, or use PostgreSQL for several servers"
-            ) from None
+            raise GalleyError(refusal.replace("{holder}", holder)) from None
         os.truncate(self._descriptor, 0)
         os.write(self._descriptor, str(os.getpid()).encode())
 
     def release(self) -> None:
-        """Let the next process serve; the file stays, since removing it would race with one opening it."""
+        """Let the next one have it; the file stays, since removing it would race with one opening it."""
         if self._descriptor is not None:
             os.close(self._descriptor)
             self._descriptor = None
