@@ -27,8 +27,9 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from galley.agents.batch import act_all  # noqa: E402
-from galley.agents.choosing import choose, draws_for  # noqa: E402
+from galley.agents.choosing import choose  # noqa: E402
 from galley.agents.network import Network, NetworkAgent  # noqa: E402
+from galley.compiled.randomness import uniform  # noqa: E402
 from galley.kitchen import Encoder, KitchenBatch, Layout  # noqa: E402
 from galley.kitchen.layout_file import load_layout  # noqa: E402
 from tests.agents.admission.newcomers import cole_policy  # noqa: E402
@@ -104,7 +105,7 @@ def parts(rounds: Rounds) -> Iterator[tuple[str, float, str]]:
     barred = np.zeros(logits.shape, dtype=np.bool_)
 
     def chosen() -> NDArray[np.int64]:
-        return choose(logits, barred, draws_for(numbers, seats, seats))
+        return choose(logits, barred, uniform(numbers, seats, seats))
 
     for name, run in (
         ("encode", lambda: rounds.encoder.seat(states, seats).astype(np.float32)),

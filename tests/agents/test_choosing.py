@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from galley.agents.choosing import choose, draws_for
+from galley.agents.choosing import choose
 from galley.compiled.randomness import uniform
 
 LOGITS = hnp.arrays(np.float32, (3, 6), elements=st.floats(-50, 50, width=32))
@@ -48,5 +48,5 @@ def test_the_most_probable_is_the_first_of_equals() -> None:
 @given(st.lists(st.tuples(st.integers(0, 2**64 - 1), st.integers(0, 1), st.integers(0, 30_000)), min_size=1))
 def test_draws_are_those_of_the_randomness_of_agents(rows: list[tuple[int, int, int]]) -> None:
     seeds, seats, ticks = zip(*rows, strict=True)
-    drawn = draws_for(np.array(seeds, dtype=np.uint64), np.array(seats), np.array(ticks))
+    drawn = uniform(np.array(seeds, dtype=np.uint64), np.array(seats), np.array(ticks))
     assert drawn.tolist() == [uniform(*row) for row in rows]

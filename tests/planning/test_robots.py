@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from galley.compiled.draw_kernel import draw
-from galley.compiled.randomness import uniform
+from galley.compiled.randomness import draw, uniform
 from galley.errors import GalleyError
 from galley.kitchen import NORTH, STAY, Kitchen, Layout
 from galley.kitchen.state import ChefView, KitchenView, PotView, from_view

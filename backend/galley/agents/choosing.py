@@ -7,7 +7,6 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from galley.compiled.draw_kernel import draw
 from galley.compiled.kernels import kernel
 
 
@@ -28,26 +27,6 @@ def choose(
     else:
         _sampled(np.ascontiguousarray(logits), barred, draws, actions)
     return actions
-
-
-def draws_for(
-    seeds: NDArray[np.uint64], seats: NDArray[np.int64], ticks: NDArray[np.int64]
-) -> NDArray[np.float64]:
-    """What `randomness.uniform` gives for each row, float64 [B], in a fraction of its time."""
-    draws = np.empty(len(seeds), dtype=np.float64)
-    _draw(seeds, seats, ticks, draws)
-    return draws
-
-
-@kernel
-def _draw(
-    seeds: NDArray[np.uint64],
-    seats: NDArray[np.int64],
-    ticks: NDArray[np.int64],
-    draws: NDArray[np.float64],
-) -> None:
-    for row in range(len(seeds)):
-        draws[row] = draw(seeds[row], seats[row], ticks[row], 0)
 
 
 @kernel

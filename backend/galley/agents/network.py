@@ -10,8 +10,9 @@ import numpy as np
 import onnxruntime as ort
 from numpy.typing import NDArray
 
-from galley.agents.choosing import choose, draws_for
+from galley.agents.choosing import choose
 from galley.agents.unstuck import Unstuck
+from galley.compiled.randomness import uniform
 from galley.errors import GalleyError
 from galley.kitchen import ACTIONS, Encoder, Layout
 
@@ -219,7 +220,7 @@ def decide(
             member.unstuck.bar(states[rows], barred[rows])
     draws = None
     if members[0].sampling == "sample":
-        draws = draws_for(np.concatenate([member.seeds for member in members]), seats, ticks)
+        draws = uniform(np.concatenate([member.seeds for member in members]), seats, ticks)
     return choose(logits, barred, draws)
 
 

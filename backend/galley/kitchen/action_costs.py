@@ -1,12 +1,12 @@
-"""Fewest actions to face a tile, the other chef left out of account. This file holds one kernel."""
+"""Fewest actions to face a tile, the other chef left out of account."""
 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy import int16, int32, uint8
 from numpy.typing import NDArray
 
+from galley.compiled.kernels import kernel
 from galley.kitchen.codes import FLOOR, STAY
 from galley.kitchen.layout import Layout
 
@@ -14,7 +14,7 @@ UNREACHABLE = -1
 FACINGS_PER_CELL = 4
 
 
-@njit(cache=True)
+@kernel
 def _costs(tiles: NDArray[uint8], targets: NDArray[int32]) -> NDArray[int16]:
     """int16[H*W*4, K]: see `action_costs`; `tiles` uint8[H,W], `targets` int32[K]."""
     height, width = tiles.shape

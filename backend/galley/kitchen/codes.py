@@ -1,7 +1,6 @@
 """The small numbers that kitchens are made of: actions, facings, tiles, things, places in arrays.
 
-The compiled kernels take these in as constants. Numba's cache does not notice a change in this file,
-so touch the kernel files (`rules.py`, `observation_kernels.py`) whenever a number here changes.
+The compiled kernels take these in as constants.
 """
 
 from __future__ import annotations

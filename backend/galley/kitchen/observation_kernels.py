@@ -1,14 +1,14 @@
-"""The compiled encodings of a kitchen for policies, in one file for the same reason as `rules.py`.
+"""The compiled encodings of a kitchen for policies.
 
 What the numbers mean is told in `observations.py` and `docs/rules.md`.
 """
 
 from __future__ import annotations
 
-from numba import njit
 from numpy import float32, int16, int64, uint8
 from numpy.typing import NDArray
 
+from galley.compiled.kernels import kernel
 from galley.kitchen.codes import (
     CELL,
     CELLS,
@@ -53,7 +53,7 @@ F_ONIONS, F_POTS, F_DISHES, F_SERVINGS = 0, 1, 2, 3
 ANY_POT, EMPTY_POT, COOKING_POT, READY_POT = -1, 0, 1, 2
 
 
-@njit(cache=True)
+@kernel
 def _grid_thing(thing: int, cell: int, cells: int, out: NDArray[uint8]) -> None:
     """Nothing; marks a thing that lies or is held at `cell` in `out` uint8[26*H*W]."""
     if thing >= ONION_SOUP:
@@ -65,7 +65,7 @@ def _grid_thing(thing: int, cell: int, cells: int, out: NDArray[uint8]) -> None:
         out[(G_INGREDIENTS + thing - ONION) * cells + cell] += 1
 
 
-@njit(cache=True)
+@kernel
 def _grid(
     spec: NDArray[int16], static: NDArray[uint8], state: NDArray[int16], seat: int, out: NDArray[uint8]
 ) -> None:
@@ -104,7 +104,7 @@ def _grid(
         out[G_URGENT * cells : (G_URGENT + 1) * cells] = 1
 
 
-@njit(cache=True)
+@kernel
 def _grid_2019(
     spec: NDArray[int16], static: NDArray[uint8], state: NDArray[int16], seat: int, out: NDArray[uint8]
 ) -> None:
@@ -150,7 +150,7 @@ def _grid_2019(
             out[at + C_ONIONS] = 1
 
 
-@njit(cache=True)
+@kernel
 def _closest(
     spec: NDArray[int16], costs: NDArray[int16], targets: NDArray[int16], kind: int, wanted: int,
     state: NDArray[int16], chef: int, out: NDArray[float32], at: int,
@@ -183,7 +183,7 @@ def _closest(
         out[at + 1] = found // width - cell // width
 
 
-@njit(cache=True)
+@kernel
 def _player_2019(
     spec: NDArray[int16], costs: NDArray[int16], targets: NDArray[int16],
     state: NDArray[int16], chef: int, out: NDArray[float32],
@@ -212,7 +212,7 @@ def _player_2019(
             out[F_WALLS + facing] = 1
 
 
-@njit(cache=True)
+@kernel
 def _features_2019(
     spec: NDArray[int16], costs: NDArray[int16], targets: NDArray[int16],
     state: NDArray[int16], seat: int, out: NDArray[float32],
@@ -230,7 +230,7 @@ def _features_2019(
     out[61] = state[CELL] // width
 
 
-@njit(cache=True)
+@kernel
 def grid(
     spec: NDArray[int16], static: NDArray[uint8], states: NDArray[int16], seats: NDArray[int64],
     out: NDArray[uint8],
@@ -242,7 +242,7 @@ def grid(
             _grid(spec, static, states[index], seats[row, slot], out[index, slot])
 
 
-@njit(cache=True)
+@kernel
 def grid_2019(
     spec: NDArray[int16], static: NDArray[uint8], states: NDArray[int16], seats: NDArray[int64],
     out: NDArray[uint8],
@@ -254,7 +254,7 @@ def grid_2019(
             _grid_2019(spec, static, states[index], seats[row, slot], out[index, slot])
 
 
-@njit(cache=True)
+@kernel
 def features_2019(
     spec: NDArray[int16], costs: NDArray[int16], targets: NDArray[int16], states: NDArray[int16],
     seats: NDArray[int64], out: NDArray[float32],

@@ -1,7 +1,6 @@
 """The rules of the kitchen, rule set `classic`: the only place that changes a kitchen's state.
 
-A single kitchen and a batch share `step`. All kernels stay in this one file because Numba's cache
-of compiled code does not notice changes made to functions in other files.
+A single kitchen and a batch share `step`.
 
 Source: Carroll et al. 2019 (Overcooked-AI as of that year), the rules of the COLE and LSI papers;
 checked against 91,102 recorded human transitions (`tests/datasets/test_overcooked_games.py`).
@@ -12,10 +11,10 @@ as plain Python too (`NUMBA_DISABLE_JIT=1`), where sums of int16 stay int16.
 
 from __future__ import annotations
 
-from numba import njit
 from numpy import int16, int32, uint8
 from numpy.typing import NDArray
 
+from galley.compiled.kernels import kernel
 from galley.kitchen.codes import (
     BIT_BLOCKED,
     BIT_DELIVER,
@@ -71,7 +70,7 @@ from galley.kitchen.codes import (
 )
 
 
-@njit(cache=True)
+@kernel
 def reset(spec: NDArray[int16], state: NDArray[int16]) -> None:
     """Nothing; sets `state` int16[S] to the start: empty hands, facing north, nothing lying or cooking."""
     state[:] = 0
@@ -79,14 +78,14 @@ def reset(spec: NDArray[int16], state: NDArray[int16]) -> None:
     state[CHEF + CELL] = spec[SPEC_STARTS + 1]
 
 
-@njit(cache=True)
+@kernel
 def _all_delivered(spec: NDArray[int16], state: NDArray[int16]) -> bool:
     """Whether there is an order list and every order of it is delivered."""
     orders = spec[SPEC_ORDERS]
     return bool(orders > 0 and state[ORDERS_DELIVERED] >= orders)
 
 
-@njit(cache=True)
+@kernel
 def finished(spec: NDArray[int16], state: NDArray[int16]) -> bool:
     """Whether the episode is over: at the horizon, or when every order of the list is delivered."""
     if state[TICK] >= spec[SPEC_HORIZON]:
@@ -94,7 +93,7 @@ def finished(spec: NDArray[int16], state: NDArray[int16]) -> bool:
     return _all_delivered(spec, state)
 
 
-@njit(cache=True)
+@kernel
 def _ahead(cell: int, facing: int, width: int) -> int:
     """The cell index one step from `cell` towards `facing`."""
     if facing == NORTH:
@@ -106,7 +105,7 @@ def _ahead(cell: int, facing: int, width: int) -> int:
     return cell - 1
 
 
-@njit(cache=True)
+@kernel
 def _pots_in_use(spec: NDArray[int16], state: NDArray[int16]) -> int:
     """How many pots are partly full, cooking or ready."""
     first = SPEC_TILES + spec[SPEC_WIDTH] * spec[SPEC_HEIGHT]
@@ -117,7 +116,7 @@ def _pots_in_use(spec: NDArray[int16], state: NDArray[int16]) -> int:
     return count
 
 
-@njit(cache=True)
+@kernel
 def _dish_is_useful(spec: NDArray[int16], state: NDArray[int16], pots_in_use: int) -> bool:
     """Whether taking a dish helps: none lies on a counter and fewer are held than pots are in use.
 
@@ -135,7 +134,7 @@ def _dish_is_useful(spec: NDArray[int16], state: NDArray[int16], pots_in_use: in
     return True
 
 
-@njit(cache=True)
+@kernel
 def _deliver(spec: NDArray[int16], state: NDArray[int16], soup: int) -> bool:
     """Whether the delivered soup pays; a soup that matches the first open order closes that order."""
     orders = spec[SPEC_ORDERS]
@@ -149,7 +148,7 @@ def _deliver(spec: NDArray[int16], state: NDArray[int16], soup: int) -> bool:
     return True
 
 
-@njit(cache=True)
+@kernel
 def _use_pot(spec: NDArray[int16], state: NDArray[int16], hand: int, slot: int) -> int:
     """The event mask of a chef who interacts with the pot at `slot` of the state."""
     held = int(state[hand])
@@ -168,7 +167,7 @@ def _use_pot(spec: NDArray[int16], state: NDArray[int16], hand: int, slot: int) 
     return 0
 
 
-@njit(cache=True)
+@kernel
 def _interact(spec: NDArray[int16], state: NDArray[int16], chef: int, pots_in_use: int) -> int:
     """The event mask of the chef at `chef` of the state, who interacts with the tile it faces."""
     target = _ahead(int(state[chef + CELL]), int(state[chef + FACING]), int(spec[SPEC_WIDTH]))
@@ -214,7 +213,7 @@ def _interact(spec: NDArray[int16], state: NDArray[int16], chef: int, pots_in_us
     return events
 
 
-@njit(cache=True)
+@kernel
 def step(spec: NDArray[int16], state: NDArray[int16], a0: int, a1: int, out: NDArray[int32]) -> int:
     """The reward of one tick; changes `state` int16[S] and fills `out` int32[4].
 
@@ -288,7 +287,7 @@ def step(spec: NDArray[int16], state: NDArray[int16], a0: int, a1: int, out: NDA
     return reward
 
 
-@njit(cache=True)
+@kernel
 def step_batch(
     spec: NDArray[int16], states: NDArray[int16], actions: NDArray[uint8], out: NDArray[int32]
 ) -> None:
@@ -297,7 +296,7 @@ def step_batch(
         step(spec, states[index], actions[index, 0], actions[index, 1], out[index])
 
 
-@njit(cache=True)
+@kernel
 def run(
     spec: NDArray[int16], state: NDArray[int16], joint_actions: NDArray[uint8],
     states: NDArray[int16], out: NDArray[int32],

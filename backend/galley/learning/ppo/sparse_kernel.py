@@ -1,4 +1,4 @@
-"""The compiled first convolution of a policy on sparse observations, in one file for Numba's cache.
+"""The compiled first convolution of a policy on sparse observations.
 
 An observation of a kitchen is the layout's map, the same for every tick, and a handful of numbers besides:
 where the chefs stand and look, what lies, is held or cooks. A convolution is linear, so that of the map is
@@ -12,14 +12,15 @@ contiguous; results float32 [B, H*W*F], channels last. The convolution is "same"
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy import float32, int32, uint8
 from numpy.typing import NDArray
+
+from galley.compiled.kernels import numeric_kernel
 
 _BLOCK = 64
 
 
-@njit(cache=True, nogil=True)
+@numeric_kernel
 def differing(seen: NDArray[uint8], map_: NDArray[uint8], places: NDArray[int32]) -> int:
     """How many numbers of `seen` differ from `map_`, both uint8 [C*H*W]; fills `places` with where."""
     found = 0
@@ -40,12 +41,12 @@ def differing(seen: NDArray[uint8], map_: NDArray[uint8], places: NDArray[int32]
     return found
 
 
-@njit(cache=True, fastmath=True, nogil=True)
+@numeric_kernel
 def spread(
     seen: NDArray[uint8], map_: NDArray[uint8], places: NDArray[int32], filters: NDArray[float32],
     height: int, width: int, out: NDArray[float32],
 ) -> None:  # fmt: skip
-    """Nothing; adds the convolution of `seen` - `map_`, not 0 at `places`, to `out` float32 [H*W*F]."""
+    """Add the convolution of `seen` - `map_`, not 0 at `places`, to `out` float32 [H*W*F]."""
     reach = filters.shape[1] // 2
     count = filters.shape[2] // filters.shape[1]
     for place in places:
@@ -61,12 +62,12 @@ def spread(
                 into[index] += number * weights[index]
 
 
-@njit(cache=True, fastmath=True, nogil=True)
+@numeric_kernel
 def gather(
     seen: NDArray[uint8], map_: NDArray[uint8], places: NDArray[int32], gradient: NDArray[float32],
     height: int, width: int, out: NDArray[float32],
 ) -> None:  # fmt: skip
-    """Nothing; the transpose of `spread`: adds to `out` float32 [C, K, K*F] what `gradient` [H*W*F] asks."""
+    """Add to `out` float32 [C, K, K*F] what `gradient` [H*W*F] asks: the transpose of `spread`."""
     reach = out.shape[1] // 2
     count = out.shape[2] // out.shape[1]
     for place in places:
@@ -82,12 +83,12 @@ def gather(
                 into[index] += number * asked[index]
 
 
-@njit(cache=True, fastmath=True, nogil=True)
+@numeric_kernel
 def convolve(
     observations: NDArray[uint8], map_: NDArray[uint8], filters: NDArray[float32], of_map: NDArray[float32],
     height: int, width: int, slope: float, out: NDArray[float32],
 ) -> None:  # fmt: skip
-    """Nothing; fills `out` with the leaky ReLU of the convolution; `of_map` [H*W*F] is that of the map."""
+    """Fill `out` with the leaky ReLU of the convolution; `of_map` [H*W*F] is that of the map."""
     lower = float32(slope)
     places = np.empty(map_.size, dtype=int32)
     for index in range(observations.shape[0]):
@@ -99,12 +100,12 @@ def convolve(
             row[place] = max(row[place], lower * row[place])
 
 
-@njit(cache=True, fastmath=True, nogil=True)
+@numeric_kernel
 def convolve_back(
     observations: NDArray[uint8], map_: NDArray[uint8], out: NDArray[float32], gradient: NDArray[float32],
     height: int, width: int, slope: float, of_filters: NDArray[float32], of_map: NDArray[float32],
 ) -> None:  # fmt: skip
-    """Nothing; adds the gradients of `filters` to `of_filters` [C, K, K*F], of the map's to `of_map`."""
+    """Add the gradients of `filters` to `of_filters` [C, K, K*F], of the map's to `of_map`."""
     lower = float32(slope)
     asked = np.empty(out.shape[1], dtype=float32)
     places = np.empty(map_.size, dtype=int32)

@@ -6,8 +6,8 @@ import numpy as np
 from numpy import int16, uint8, uint64
 from numpy.typing import NDArray
 
-from galley.compiled.draw_kernel import draw
 from galley.compiled.kernels import kernel, lean_kernel
+from galley.compiled.randomness import draw
 from galley.kitchen.codes import INTERACT, TICK
 from galley.kitchen.rules.classic import finished, reset
 from galley.planning.kernels.myopic_kernel import MEMORY_SIZE, decide, remember
