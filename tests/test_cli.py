@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
 
 import galley
+from galley.extras import EXTRA_OF
 from tests.serving import run_galley
 
 ROOT = Path(__file__).parents[1]
@@ -125,3 +128,39 @@ def test_play_gives_both_seat_orders_and_repeats_itself() -> None:
     assert [row["seats"] for row in rows] == [["random", "stay"], ["stay", "random"]]
     assert all(row["games"] == 2 and row["standard_error"] >= 0 for row in rows)
     assert first.stdout == again.stdout
+
+
+@pytest.mark.parametrize(
+    ("library", "extra", "line"),
+    [
+        ("torch", "learn", "learn train sp --layout cramped_room --out run"),
+        ("torch", "learn", "learn export run --name mine"),
+        ("tqdm", "learn", "learn bc"),
+        ("matplotlib", "learn", "learn plot curves run --out x.svg"),
+        ("distributed", "evaluate", "evaluate cramped_room --workers 2"),
+    ],
+)
+def test_f18_a_command_without_its_extra_says_so_in_one_line(
+    tmp_path: Path, library: str, extra: str, line: str
+) -> None:
+    program = (
+        f"import sys; sys.modules[{library!r}] = None\n"
+        "import importlib.util; found = importlib.util.find_spec\n"
+        f"importlib.util.find_spec = lambda name, *a: None if name == {library!r} else found(name, *a)\n"
+        f"sys.argv = ['galley', *{line.split()!r}]; from galley.cli import main; main()"
+    )
+    (tmp_path / "layouts").mkdir()
+    shutil.copy(ROOT / "layouts" / "cramped_room.yaml", tmp_path / "layouts")
+    told = {"capture_output": True, "text": True, "timeout": 120, "check": False}
+    run = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, **told)
+    assert run.returncode == 1, run.stdout + run.stderr
+    assert "Traceback" not in run.stderr
+    assert f"pip install 'galley[{extra}]'" in run.stderr.strip().splitlines()[-1]
+
+
+def test_f18_the_table_of_extras_is_that_of_the_project() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    for library, extra in EXTRA_OF.items():
+        wanted = " ".join(project["optional-dependencies"][extra]).lower().replace("-", "_")
+        names = {"PIL": "pillow", "dask": "distributed"}
+        assert names.get(library, library) in wanted

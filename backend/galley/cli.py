@@ -23,6 +23,7 @@ from galley.commands import (
 )
 from galley.commands.learn import app as learn
 from galley.errors import GalleyError
+from galley.extras import lacking
 
 app = typer.Typer(
     help="Human-AI experiments in the shared kitchen of Overcooked.",
@@ -66,6 +67,12 @@ def main() -> None:
         app()
     except GalleyError as error:
         typer.echo(error, err=True)
+        sys.exit(1)
+    except ImportError as error:
+        told = lacking(error)
+        if told is None:
+            raise
+        typer.echo(told, err=True)
         sys.exit(1)
     except OSError as error:
         if error.filename is None:

@@ -144,3 +144,88 @@ def test_a_truncated_file_is_refused(folder: Path, tmp_path: Path) -> None:
     path.write_bytes((folder / "clean_test_trials.pickle").read_bytes()[:1_000_000])
     with pytest.raises(GalleyError, match="not a whole pickle"):
         import_files([path])
+
+
+def frame_bytes(names: object, shape: object, dtype: object, content: object) -> bytes:
+    """A pickle that asks for the very names that a frame of pandas 1 asks for, with parts of our choice."""
+    made = (
+        b"\x80\x04cpandas.core.frame\nDataFrame\n)\x81}\x8c\x05_datacpandas.core.internals.managers\n"
+        b"BlockManager\n)\x81("
+    )
+    array = b"cnumpy.core.multiarray\n_reconstruct\n)R("
+    state = (
+        b"K\x01" + body(shape) + b"cnumpy\ndtype\n" + body((dtype,)) + b"R" + b"\x89" + body(content) + b"tb"
+    )
+    index = (
+        array
+        + b"K\x01"
+        + body((1,))
+        + b"cnumpy\ndtype\n"
+        + body(("O8",))
+        + b"R"
+        + b"\x89"
+        + body(names)
+        + b"tb"
+    )
+    index = (
+        b"cpandas.core.indexes.base\n_new_Index\n(cpandas.core.indexes.base\nIndex\n}\x8c\x04data"
+        + index
+        + b"stR"
+    )
+    return made + b"N](" + array + state + b"e](" + index + b"e" + b"tbsb."
+
+
+def body(value: object) -> bytes:
+    """The pickle of a plain value without what opens and ends it; nothing is kept for later use."""
+    raw = pickle.dumps(value, 2)
+    return raw[2:-1]
+
+
+def doubling(depth: int) -> object:
+    """A tuple of two of itself, so often that to write or hash it would take for ever."""
+    value: object = "x"
+    for _ in range(depth):
+        value = (value, value)
+    return value
+
+
+def deep(depth: int) -> object:
+    value: object = ()
+    for _ in range(depth):
+        value = (value,)
+    return value
+
+
+@pytest.mark.parametrize(
+    ("names", "shape", "dtype", "content"),
+    [
+        pytest.param(["state"], (1, float("inf")), "O8", ["x"], id="infinite size"),
+        pytest.param(["state"], (1, 10**30), "O8", ["x"], id="huge size"),
+        pytest.param(["state"], (1, -1), "O8", ["x"], id="negative size"),
+        pytest.param(["state"], (1,) * 500, "O8", ["x"], id="very many sizes"),
+        pytest.param([doubling(60)], (1, 1), "O8", ["x"], id="name that doubles itself"),
+        pytest.param(["state"], (1, 1), doubling(60), ["x"], id="type that doubles itself"),
+        pytest.param(["state"], (1, 1), "O8", doubling(60), id="content that doubles itself"),
+        pytest.param([deep(900)], (1, 1), "O8", ["x"], id="deep name"),
+        pytest.param(7, (1, 1), "O8", ["x"], id="no names"),
+    ],
+)
+def test_a12_a_frame_with_odd_parts_is_refused_in_one_line(
+    tmp_path: Path, names: object, shape: object, dtype: object, content: object
+) -> None:
+    path = tmp_path / "odd.pickle"
+    path.write_bytes(frame_bytes(names, shape, dtype, content))
+    with pytest.raises(GalleyError) as caught:
+        import_files([path])
+    assert str(caught.value).startswith(f"{path}: not a pickled pandas frame (")
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 600
+
+
+def test_a12_the_frame_of_the_tests_is_read_when_its_parts_are_plain(tmp_path: Path) -> None:
+    path = tmp_path / "plain.pickle"
+    path.write_bytes(frame_bytes(["state"], (1, 2), "O8", ["x", "y"]))
+    assert read_frame(path)["state"].tolist() == ["x", "y"]
+    path.write_bytes(frame_bytes(["state"], (1, 2), "O8", ["x", doubling(60)]))
+    with pytest.raises(GalleyError, match="column layout_name is missing"):
+        import_files([path])

@@ -186,3 +186,59 @@ def test_any_text_gives_a_model_or_problems_with_fixes(
         assert problem.message
         assert problem.fix
         assert problem.line is None or 1 <= problem.line <= text.count("\n") + 2
+
+
+def test_f17_merge_keys_bring_what_an_anchor_holds(tmp_path: Path) -> None:
+    text = """\
+format: 1
+owner: x
+fruit:
+  - &base {kind: apple, colour: red, weight_g: 50}
+  - {<<: *base, colour: green}
+  - <<: [{colour: blue}, *base]
+    weight_g: 7
+"""
+    basket = read(tmp_path, text)
+    assert [(apple.colour, apple.weight_g) for apple in basket.value.fruit] == [
+        ("red", 50),
+        ("green", 50),
+        ("blue", 7),
+    ]
+    assert basket.line("fruit", 1, "colour") == 5
+    assert basket.line("fruit", 2, "weight_g") == 7
+
+
+@pytest.mark.parametrize(
+    ("row", "told"),
+    [
+        (
+            "{<<: base, kind: nut}",
+            "basket.yaml:4: '<<' takes keys and values from elsewhere, and this is none; ",
+        ),
+        (
+            "{<<: [base], kind: nut}",
+            "basket.yaml:4: '<<' takes keys and values from elsewhere, and this is none; ",
+        ),
+        ('{"<<": {hard: true}, kind: nut}', "basket.yaml:4: key '<<' is unknown in 'fruit' no. 1; "),
+        (
+            "{type: nut, hard: true}",
+            "basket.yaml:4: key 'kind' is missing in 'fruit' no. 1, and 'type' is unknown there; write",
+        ),
+        (
+            "{Kind: nut, hard: true}",
+            "basket.yaml:4: key 'kind' is missing in 'fruit' no. 1, and 'Kind' is unknown there; write",
+        ),
+        ("{hard: true}", "basket.yaml:4: key 'kind' is missing in 'fruit' no. 1; add `kind: ...`"),
+    ],
+)
+def test_f17_what_stands_where_the_kind_should_is_named(tmp_path: Path, row: str, told: str) -> None:
+    assert refused(tmp_path, f"format: 1\nowner: x\nfruit:\n  - {row}\n")[0].startswith(told)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["[" * 20_000, "a: " + "{b: " * 20_000, "- " * 20_000, "\n".join(" " * n + "a:" for n in range(1200))],
+)
+def test_a12_a_file_nested_very_deep_is_refused_in_one_line(tmp_path: Path, text: str) -> None:
+    (told,) = refused(tmp_path, text)
+    assert "nested more than 50 levels deep; " in told

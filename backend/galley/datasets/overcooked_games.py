@@ -29,9 +29,11 @@ NAMES: Final = {"random0": "forced_coordination", "random3": "counter_circuit"}
 """Our names of the layouts that the recording calls otherwise."""
 
 REWARD_FACTOR: Final = 4
-_COLUMNS: Final = ("layout_name", "layout", "state", "joint_action", "next_state", "reward", "cur_gameloop")
+_TEXTS: Final = ("layout_name", "layout", "state", "joint_action", "next_state")
+_COLUMNS: Final = (*_TEXTS, "reward", "cur_gameloop")
 _FIX: Final = "use the file as the overcooked-ai package ships it"
 _LONGEST_GAME: Final = 30_000
+_TOLD_CHARACTERS: Final = 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +125,12 @@ def human_games(path: Path) -> list[HumanGame]:
     missing = [name for name in _COLUMNS if name not in columns]
     if missing:
         raise GalleyError(f"{path}: column {missing[0]} is missing; {_FIX}")
+    for name in _COLUMNS:  # before anything is hashed, compared or shown: an object may be of any depth
+        kinds = (str,) if name in _TEXTS else (int, float, np.number)
+        odd = next((row for row, value in enumerate(columns[name]) if not isinstance(value, kinds)), None)
+        if odd is not None:
+            kind = type(columns[name][odd]).__name__
+            raise GalleyError(f"{path}: row {odd} of column {name} holds a {kind}; {_FIX}")
     loop = columns["cur_gameloop"]
     starts = [row for row in range(len(loop)) if row == 0 or loop[row] != loop[row - 1] + 1]
     games = []
@@ -137,9 +145,11 @@ def human_games(path: Path) -> list[HumanGame]:
             IndexError,
             AttributeError,
             OverflowError,
+            RecursionError,
             GalleyError,
         ) as error:
-            raise GalleyError(f"{path}: the game at row {first} cannot be read ({error}); {_FIX}") from None
+            told = str(error)[:_TOLD_CHARACTERS]
+            raise GalleyError(f"{path}: the game at row {first} cannot be read ({told}); {_FIX}") from None
     return games
 
 

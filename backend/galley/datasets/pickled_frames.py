@@ -6,6 +6,7 @@ plain frame needs, each with a stand-in of ours that only keeps what it is given
 
 from __future__ import annotations
 
+import math
 import pickle
 from pathlib import Path
 from typing import Any, Final
@@ -18,6 +19,8 @@ from galley.errors import GalleyError
 _PLAIN_TYPES: Final = {"b1": "bool", "f8": "<f8", "i8": "<i8", "f4": "<f4", "i4": "<i4", "u1": "u1"}
 _OBJECTS: Final = ("O8", "O")
 _LARGEST_ARRAY: Final = 100_000_000
+_LARGEST_FILE_BYTES: Final = 500_000_000
+_TOLD_CHARACTERS: Final = 200
 
 
 class _Kept:
@@ -47,9 +50,11 @@ class _Array(_Kept):
             ValueError: its shape, type and contents do not agree.
         """
         _, shape, dtype, column_major, content = self.state
-        sizes = [int(size) for size in shape]
-        count = int(np.prod(sizes, dtype=object)) if sizes else 1
-        if min(sizes, default=0) < 0 or count > _LARGEST_ARRAY or not isinstance(dtype, _Dtype):
+        sizes = list(shape)
+        if not all(isinstance(size, int) and 0 <= size <= _LARGEST_ARRAY for size in sizes) or len(sizes) > 2:
+            raise ValueError("an array whose shape is none of a table's")
+        count = math.prod(sizes)
+        if count > _LARGEST_ARRAY or not isinstance(dtype, _Dtype):
             raise ValueError(f"an array of shape {sizes}")
         if dtype.code in _OBJECTS:
             if not isinstance(content, list) or len(content) != count:
@@ -66,8 +71,8 @@ class _Array(_Kept):
 class _Dtype(_Kept):
     """numpy.dtype."""
 
-    def __init__(self, code: str = "", *_: object) -> None:
-        self.code = code
+    def __init__(self, code: object = "", *_: object) -> None:
+        self.code = code if isinstance(code, str) else ""
 
 
 class _Index(_Kept):
@@ -104,7 +109,8 @@ class _Unpickler(pickle.Unpickler):
         try:
             return _STAND_INS[module, name]
         except KeyError:
-            told = f"{self._shown}: the pickle asks for {module}.{name}, which is refused"
+            wanted = f"{module}.{name}"[:_TOLD_CHARACTERS]
+            told = f"{self._shown}: the pickle asks for {wanted}, which is refused"
             fix = "use a plain pandas frame, such as the human games of the overcooked-ai package"
             raise GalleyError(f"{told}; {fix}") from None
 
@@ -117,6 +123,9 @@ def read_frame(path: Path) -> dict[str, NDArray[Any]]:
     """
     fix = "use the file as the overcooked-ai package ships it"
     try:
+        size = path.stat().st_size
+        if size > _LARGEST_FILE_BYTES:
+            raise GalleyError(f"{path}: the file has {size} bytes, more than {_LARGEST_FILE_BYTES}; {fix}")
         with path.open("rb") as file:
             frame = _Unpickler(file, str(path)).load()
     except GalleyError:
@@ -124,11 +133,13 @@ def read_frame(path: Path) -> dict[str, NDArray[Any]]:
     except OSError as error:
         raise GalleyError(f"{path}: cannot be read ({error.strerror or error}); check the path") from None
     except Exception as error:  # a damaged pickle may raise anything
-        raise GalleyError(f"{path}: not a whole pickle ({type(error).__name__}: {error}); {fix}") from None
+        told = f"{type(error).__name__}: {error}"[:_TOLD_CHARACTERS]
+        raise GalleyError(f"{path}: not a whole pickle ({told}); {fix}") from None
     try:
         return _columns(frame)
-    except (AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
-        raise GalleyError(f"{path}: not a pickled pandas frame ({error}); {fix}") from None
+    except Exception as error:  # what stands where a part of a frame should may be anything
+        told = str(error)[:_TOLD_CHARACTERS] or type(error).__name__
+        raise GalleyError(f"{path}: not a pickled pandas frame ({told}); {fix}") from None
 
 
 def _columns(frame: Any) -> dict[str, NDArray[Any]]:
@@ -139,7 +150,9 @@ def _columns(frame: Any) -> dict[str, NDArray[Any]]:
     columns = {}
     for array, index in zip(arrays, names, strict=True):
         for name, values in zip(index.data.values(), array.values(), strict=True):
-            columns[str(name)] = values
+            if not isinstance(name, str):
+                raise TypeError(f"a column is named by a {type(name).__name__}")
+            columns[name] = values
     if len({len(values) for values in columns.values()}) != 1:
         raise ValueError("its columns are not equally long")
     return columns

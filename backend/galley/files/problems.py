@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 import pydantic
 from pydantic_core import ErrorDetails
 
-from galley.names import name_fix
+from galley.names import name_fix, nearest
 
 Loc = tuple[str | int, ...]
 
@@ -78,7 +78,11 @@ def _words(detail: ErrorDetails, loc: Loc, model: type[pydantic.BaseModel]) -> t
             return f"{tag} '{ctx['tag']}' is unknown{_within((*loc, ''))}", name_fix(ctx["tag"], known)
         case "union_tag_not_found":
             tag = str(ctx["discriminator"]).strip("'")
-            return f"key '{tag}' is missing{_within((*loc, ''))}", f"add `{tag}: ...`"
+            told = f"key '{tag}' is missing{_within((*loc, ''))}"
+            meant = _meant(tag, detail["input"], _members(model, detail["loc"]))
+            if meant is not None:
+                return f"{told}, and '{meant}' is unknown there", f"write `{tag}: ...` in its place"
+            return told, f"add `{tag}: ...`"
         case "greater_than_equal" | "greater_than" | "less_than_equal" | "less_than":
             words = {"ge": "at least", "gt": "more than", "le": "at most", "lt": "less than"}
             name, limit = next((name, ctx[name]) for name in words if name in ctx)
@@ -99,6 +103,22 @@ def _words(detail: ErrorDetails, loc: Loc, model: type[pydantic.BaseModel]) -> t
             fix = "put it in quotes" if wanted == "text" and not got.startswith("'") else f"write {wanted}"
             return f"{key} must be {wanted}, not {got}", fix
     return f"{key}: {detail['msg']}", "change it"
+
+
+def _meant(tag: str, given: Any, members: list[Any]) -> str | None:
+    """The unknown key that stands where `tag` should: spelt nearly so, or with one of the values of `tag`."""
+    known = {key for member in members for key in member.model_fields}
+    keys = [str(key) for key in given if key not in known] if isinstance(given, dict) else []
+    values = {value for member in members for value in _tags(member)[1:]}
+    by_value = (key for key in keys if isinstance(given[key], str) and given[key] in values)
+    return nearest(tag, keys) or next(by_value, None)
+
+
+def _members(model: Any, loc: Loc) -> list[Any]:
+    """The models of the union at `loc`."""
+    for part in loc:
+        model = _below(model, part)
+    return [_bare(member) for member in get_args(_only(model))]
 
 
 def _told(loc: Loc) -> str:

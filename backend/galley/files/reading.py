@@ -11,6 +11,7 @@ from typing import Any, Generic, TypeVar
 import pydantic
 from pydantic_core import PydanticCustomError
 from ruamel.yaml import YAML
+from ruamel.yaml.composer import Composer
 from ruamel.yaml.constructor import SafeConstructor
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
@@ -19,8 +20,12 @@ from galley.errors import InvalidFiles, Problem
 from galley.files.problems import explain
 
 LARGEST_FILE_BYTES = 1_000_000
+MOST_LEVELS = 50
 MOST_NODES = 100_000
 """An alias counts each time it is used, so a file cannot unfold without end."""
+
+MERGE = "tag:yaml.org,2002:merge"
+"""The tag of a plain `<<`."""
 
 Loc = tuple[str | int, ...]
 
@@ -116,13 +121,19 @@ def _compose(path: Path, name: str) -> Node:
         line = raw.count(b"\n", 0, error.start) + 1
         raise InvalidFiles([Problem(name, line, "the text is not UTF-8", "save the file as UTF-8")]) from None
     try:
-        root = YAML(typ="safe", pure=True).compose(text)
+        reader = YAML(typ="safe", pure=True)
+        reader.Composer = _Composer
+        root = reader.compose(text)
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         told = ", ".join(part for part in (error.context, error.problem) if part)
         place = None if mark is None else mark.line + 1
         fix = "check indentation, colons and quotes on this line and the one before"
         raise InvalidFiles([Problem(name, place, f"not YAML: {told}", fix)]) from None
+    except _TooDeepError as error:
+        told = f"the file is nested more than {MOST_LEVELS} levels deep"
+        fix = "write fewer lists and keys inside each other"
+        raise InvalidFiles([Problem(name, error.line, told, fix)]) from None
     except (YAMLError, ValueError) as error:
         told = f"not YAML: {str(error).splitlines()[0]}"
         raise InvalidFiles([Problem(name, None, told, "keep to plain text")]) from None
@@ -130,6 +141,29 @@ def _compose(path: Path, name: str) -> Node:
         raise InvalidFiles([Problem(name, 1, "the file is empty", "write its keys, or remove it")])
     document: Node = root
     return document
+
+
+class _TooDeepError(Exception):
+    """A node that lies too deep, found before what is below it is read."""
+
+    def __init__(self, line: int) -> None:
+        super().__init__(line)
+        self.line = line
+
+
+class _Composer(Composer):
+    """Nodes from YAML, no deeper than anything that Galley reads."""
+
+    depth = 0
+
+    def compose_node(self, parent: Node | None, index: int) -> Any:
+        self.depth += 1
+        if self.depth > MOST_LEVELS:
+            raise _TooDeepError(self.parser.peek_event().start_mark.line + 1)
+        try:
+            return super().compose_node(parent, index)
+        finally:
+            self.depth -= 1
 
 
 class _Tree:
@@ -145,8 +179,8 @@ class _Tree:
 
     def value(self, node: Node, loc: Loc) -> Any:
         self._nodes += 1
-        if self._nodes > MOST_NODES or len(loc) > 50:
-            told = f"the file unfolds to more than {MOST_NODES} values or 50 levels"
+        if self._nodes > MOST_NODES or len(loc) > MOST_LEVELS:
+            told = f"the file unfolds to more than {MOST_NODES} values or {MOST_LEVELS} levels"
             fix = "use fewer aliases (`*name`)"
             raise InvalidFiles([Problem(self.path, node.start_mark.line + 1, told, fix)])
         self.lines.setdefault(loc, node.start_mark.line + 1)
@@ -158,8 +192,12 @@ class _Tree:
 
     def _mapping(self, node: MappingNode, loc: Loc) -> dict[str, Any]:
         values: dict[str, Any] = {}
+        merged: list[Node] = []
         for key_node, value_node in node.value:
             line = key_node.start_mark.line + 1
+            if key_node.tag == MERGE:
+                merged += value_node.value if isinstance(value_node, SequenceNode) else [value_node]
+                continue
             if not isinstance(key_node, ScalarNode):
                 self.problems.append(Problem(self.path, line, "a key must be one word", "write `key: value`"))
                 continue
@@ -170,7 +208,26 @@ class _Tree:
                 continue
             self.lines[(*loc, key)] = line
             values[key] = self.value(value_node, (*loc, key))
+        for other in merged:
+            self._merge(other, loc, values)
         return values
+
+    def _merge(self, node: Node, loc: Loc, values: dict[str, Any]) -> None:
+        """Add what a `<<` brings; keys that are there already stay.
+
+        Source: https://yaml.org/type/merge.html.
+        """
+        if not isinstance(node, MappingNode):
+            line = node.start_mark.line + 1
+            told = "'<<' takes keys and values from elsewhere, and this is none"
+            self.problems.append(
+                Problem(self.path, line, told, "name an anchor of keys and values: `<<: *name`")
+            )
+            return
+        lines = dict(self.lines)
+        for key, value in self._mapping(node, loc).items():
+            values.setdefault(key, value)
+        self.lines |= lines
 
     def _scalar(self, node: Node, loc: Loc) -> Any:
         if isinstance(node, ScalarNode) and node.style in ("|", ">"):
