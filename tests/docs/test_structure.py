@@ -14,6 +14,7 @@ MOST_MODULES = 16
 IMPORTED_AS = {
     "argon2-cffi": "argon2",
     "markdown-it-py": "markdown_it",
+    "onnxscript": "torch",
     "pillow": "PIL",
     "psycopg": "psycopg",
     "resvg-py": "resvg_py",

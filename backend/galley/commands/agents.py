@@ -6,6 +6,7 @@ import importlib.util
 import json
 import shlex
 import sys
+import zipfile
 from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
@@ -209,6 +210,9 @@ def _converted(path: Path, shape: tuple[int, ...], origin: Origin, network: str 
     if origin is Origin.onnx:
         from galley.agents.admission.adding import as_it_is
 
+        meant = _other_kind(path)
+        if meant is not None:
+            raise GalleyError(f"this is no ONNX file but {meant}")
         try:
             return as_it_is(path, shape)
         except GalleyError as error:
@@ -222,6 +226,32 @@ def _converted(path: Path, shape: tuple[int, ...], origin: Origin, network: str 
     if network is None:
         return from_torchscript(path, shape)
     return from_state_dict(path, network, shape)
+
+
+def _other_kind(path: Path) -> str | None:
+    """What a file that PyTorch or others wrote is, with how to name it; None if it may be ONNX."""
+    with path.open("rb") as file:
+        start = file.read(4)
+    if start == b"PK\x03\x04":
+        try:
+            with zipfile.ZipFile(path) as archive:
+                parts = archive.namelist()
+        except zipfile.BadZipFile:
+            return "a damaged zip file; save it again"
+        if any(part.endswith("constants.pkl") for part in parts):
+            return "TorchScript; name `--from torchscript`"
+        if any(part.endswith("data.pkl") for part in parts):
+            return "a file of torch.save; name `--from state-dict --network ...`"
+        if any(part.endswith((".pth", ".pt")) for part in parts):
+            return (
+                "a zip with PyTorch files (as stable-baselines3 saves); take the .pth out of it and add that"
+            )
+        return "a zip file; add the network that is in it"
+    if start[:1] == b"\x80":
+        return "a pickle (torch.save in its old form?); name `--from state-dict --network ...`"
+    if start == b"\x89HDF":
+        return "an HDF5 file (Keras?); export it to ONNX and add that"
+    return None
 
 
 def _need(packages: Sequence[str], why: str) -> None:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import os
 import pickle
+import shutil
 import subprocess
 import sys
 import warnings
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +19,12 @@ from torch import nn
 
 from galley.errors import GalleyError, InvalidFiles
 from galley.learning.bundles.described_network import KNOWN, described_onnx, network_named
+from galley.learning.bundles.onnx_adapting import conform
 from galley.learning.bundles.torch_files import from_state_dict, from_torchscript
 from tests.agents.admission.newcomers import cole_weights
+from tests.serving import run_galley
+
+ROOT = Path(__file__).parents[3]
 
 GRID = (26, 4, 5)
 SEEN = np.random.default_rng(2).integers(0, 3, (6, *GRID)).astype(np.float32)
@@ -104,6 +110,53 @@ def test_a_state_dict_with_a_network_of_ones_own(tmp_path: Path) -> None:
     with torch.no_grad():
         hidden = nn.functional.elu(body(torch.from_numpy(seen).permute(0, 3, 1, 2)))
         assert np.allclose(answers(made.content, seen), head(hidden).numpy(), atol=1e-4)
+
+
+OWN = """\
+format: 1
+layers:
+  - {kind: dense, width: 32, activation: relu, weights: body}
+  - {kind: dense, width: 6, weights: actor}
+ignore: [critic.]
+"""
+
+
+@pytest.mark.parametrize(
+    "renamed",
+    [
+        "_orig_mod.{}.{}",
+        "{}._orig_mod.{}",
+        "module.{}.{}",
+        "_orig_mod.module.{}.{}",
+        "module._orig_mod.{}.{}",
+        "agent.policy.{}.{}",
+    ],
+)
+def test_f25_a_prefix_that_all_keys_share_is_left_out(tmp_path: Path, renamed: str) -> None:
+    sizes = {"body": (26 * 4 * 5, 32), "actor": (32, 6), "critic": (32, 1)}
+    parts = {name: nn.Linear(*size) for name, size in sizes.items()}
+    tensors = {
+        renamed.format(name, key): one
+        for name, part in parts.items()
+        for key, one in part.state_dict().items()
+    }
+    torch.save(tensors, tmp_path / "policy.pth")
+    (tmp_path / "network.yaml").write_text(OWN, "utf-8")
+    made = from_state_dict(tmp_path / "policy.pth", str(tmp_path / "network.yaml"), GRID)
+    with torch.no_grad():
+        hidden = torch.relu(parts["body"](torch.from_numpy(SEEN).flatten(1)))
+        assert np.allclose(answers(made.content), parts["actor"](hidden).numpy(), atol=1e-4)
+    assert "names of tensors without" in " ".join(made.notes)
+
+
+def test_f25_a_description_that_names_the_prefix_is_taken_as_it_is(tmp_path: Path) -> None:
+    part = nn.Linear(26 * 4 * 5, 6)
+    torch.save({f"net.{key}": one for key, one in part.state_dict().items()}, tmp_path / "policy.pth")
+    text = "format: 1\nlayers:\n  - {kind: dense, width: 6, weights: net}\n"
+    (tmp_path / "network.yaml").write_text(text, "utf-8")
+    made = from_state_dict(tmp_path / "policy.pth", str(tmp_path / "network.yaml"), GRID)
+    assert made.notes[0] == "exported from a PyTorch state dict"
+    assert "names of tensors" not in " ".join(made.notes)
 
 
 def test_what_does_not_fit_is_told_all_at_once() -> None:
@@ -200,3 +253,61 @@ def test_without_the_extra_the_way_to_install_it_is_told(tmp_path: Path) -> None
         assert done.returncode == 1
         assert "pip install 'galley[learn]'" in done.stderr
         assert done.stderr.count("\n") == 1
+
+
+def test_d12_what_pytorch_exports_as_its_documentation_shows_is_taken(tmp_path: Path) -> None:
+    network = cole()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        torch.onnx.export(network, torch.zeros(1, *GRID), str(tmp_path / "a.onnx"), verbose=False)
+    made = conform(tmp_path / "a.onnx", GRID)
+    assert np.allclose(answers(made.content), wanted(network), atol=1e-4)
+
+
+def _saved(path: Path, kind: str) -> None:
+    network = nn.Linear(4, 6)
+    if kind == "torch.save":
+        torch.save(network.state_dict(), path)
+    elif kind == "old torch.save":
+        torch.save(network.state_dict(), path, _use_new_zipfile_serialization=False)
+    elif kind == "torchscript":
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            torch.jit.save(torch.jit.script(network), str(path))
+    elif kind == "stable-baselines3":
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("policy.pth", b"")
+            archive.writestr("data", b"{}")
+    elif kind == "keras":
+        path.write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(64))
+
+
+@pytest.mark.parametrize(
+    ("kind", "told"),
+    [
+        ("torch.save", "a file of torch.save; name `--from state-dict"),
+        ("old torch.save", "a pickle (torch.save in its old form?); name `--from state-dict"),
+        ("torchscript", "TorchScript; name `--from torchscript`"),
+        ("stable-baselines3", "a zip with PyTorch files (as stable-baselines3 saves); take the .pth out"),
+        ("keras", "an HDF5 file (Keras?); export it to ONNX"),
+    ],
+)
+def test_d13_a_file_of_another_kind_is_told_how_it_is_added(tmp_path: Path, kind: str, told: str) -> None:
+    (tmp_path / "layouts").mkdir()
+    shutil.copy(ROOT / "layouts" / "cramped_room.yaml", tmp_path / "layouts")
+    _saved(tmp_path / "policy.pth", kind)
+    line = [
+        "agents",
+        "add",
+        "policy.pth",
+        "--name",
+        "guest",
+        "--encoding",
+        "grid",
+        "--layout",
+        "cramped_room",
+    ]
+    refused = run_galley(*line, cwd=tmp_path)
+    assert refused.returncode == 1
+    assert f"this is no ONNX file but {told}" in refused.stderr
+    assert refused.stderr.count("\n") == 1

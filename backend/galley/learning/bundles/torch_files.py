@@ -6,6 +6,7 @@ import importlib
 import sys
 import tempfile
 import warnings
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -20,6 +21,9 @@ from galley.learning.bundles.onnx_writing import OPSET
 
 WRAPPINGS: Final = ("state_dict", "model_state_dict", "model", "policy", "actor")
 """Keys under which checkpoints keep the state dict itself."""
+
+COMPILED: Final = "_orig_mod."
+"""What `torch.compile` puts into the names of a compiled network, and of compiled parts of one."""
 
 
 def from_torchscript(path: Path, shape: tuple[int, ...]) -> Converted:
@@ -47,7 +51,28 @@ def from_state_dict(path: Path, network: str, shape: tuple[int, ...]) -> Convert
         GalleyError: file and network cannot be read, or do not fit each other.
     """
     tensors, notes = _state_dict(path)
-    if ":" in network and not Path(network).is_file():
+    whole_class = ":" in network and not Path(network).is_file()
+    try:
+        content, more = _with_weights(network, tensors, shape, whole_class)
+    except GalleyError:
+        shared, bare = _without_shared_prefix(tensors)
+        if not shared:
+            raise
+        try:
+            content, more = _with_weights(network, bare, shape, whole_class)
+        except GalleyError:
+            pass
+        else:
+            return Converted(content, (*notes, f"names of tensors without the shared '{shared}'", *more))
+        raise
+    return Converted(content, (*notes, *more))
+
+
+def _with_weights(
+    network: str, tensors: Mapping[str, torch.Tensor], shape: tuple[int, ...], whole_class: bool
+) -> tuple[bytes, tuple[str, ...]]:
+    """ONNX of a class or of a described network with these weights, and what had to be mended."""
+    if whole_class:
         module = _made(network)
         try:
             module.load_state_dict(tensors)
@@ -57,7 +82,18 @@ def from_state_dict(path: Path, network: str, shape: tuple[int, ...]) -> Convert
     else:
         arrays = {name: tensor.detach().float().numpy() for name, tensor in tensors.items()}
         made = conform(described_onnx(network_named(network), arrays, shape), shape)
-    return Converted(made.content, (*notes, *made.notes))
+    return made.content, made.notes
+
+
+def _without_shared_prefix(tensors: Mapping[str, torch.Tensor]) -> tuple[str, dict[str, torch.Tensor]]:
+    """The parts that open every name, such as `module.` of DataParallel, and the tensors without them."""
+    shared = ""
+    bare = dict(tensors)
+    while len({name.partition(".")[0] for name in bare}) == 1 and all("." in name for name in bare):
+        first = next(iter(bare)).partition(".")[0] + "."
+        shared += first
+        bare = {name.removeprefix(first): tensor for name, tensor in bare.items()}
+    return shared, bare
 
 
 def _state_dict(path: Path) -> tuple[dict[str, torch.Tensor], tuple[str, ...]]:
@@ -75,8 +111,11 @@ def _state_dict(path: Path) -> tuple[dict[str, torch.Tensor], tuple[str, ...]]:
                 found, notes = found[key], (f"exported from a PyTorch state dict under '{key}'",)
                 break
     if not isinstance(found, dict) or not found or not all(torch.is_tensor(one) for one in found.values()):
-        keys = f" with keys {', '.join(map(str, found))}" if isinstance(found, dict) else ""
+        keys = f" with keys {', '.join(map(str, found))}"[:500] if isinstance(found, dict) else ""
         raise GalleyError(f"the file holds {type(found).__name__}{keys}, not a state dict of tensors")
+    if any(COMPILED in name for name in found):
+        found = {name.replace(COMPILED, ""): tensor for name, tensor in found.items()}
+        notes = (*notes, f"names of tensors without '{COMPILED}' of torch.compile")
     return found, notes
 
 
