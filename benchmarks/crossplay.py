@@ -26,7 +26,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from galley.agents.bundle import Bundle, load_bundle  # noqa: E402
-from galley.agents.play import play_in_seats  # noqa: E402
+from galley.agents.episode import play_episodes  # noqa: E402
 from galley.evaluation.game_graph import centrality_matrix, graphic_shapley  # noqa: E402
 from galley.kitchen import Encoder, Layout  # noqa: E402
 from galley.kitchen.layout_file import load_layout  # noqa: E402
@@ -60,8 +60,8 @@ def best_s(work: Callable[[], object]) -> float:
 
 def cell_s(seats: tuple[Bundle, Bundle], layout: Layout) -> float:
     """Processor seconds of one cell."""
-    play_in_seats(seats, layout, [0])
-    return best_s(lambda: play_in_seats(seats, layout, list(range(GAMES))))
+    play_episodes(layout, seats, [0])
+    return best_s(lambda: play_episodes(layout, seats, list(range(GAMES))))
 
 
 def network(folder: Path, content: bytes) -> Bundle:

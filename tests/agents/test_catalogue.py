@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-import galley.agents.admission.trial as trials
-from galley.agents.catalogue import Catalogue
+from galley.agents.catalogue import Catalogue, problems_on
 from galley.agents.scripted import Stay
 from galley.errors import GalleyError
 from galley.kitchen import Layout
@@ -87,7 +86,7 @@ class Moody(Stay):
 def tried(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, agent: type[Stay], layout: Layout = ROOM) -> str:
     loaded = bundle(tmp_path, linear_policy())
     monkeypatch.setattr(type(loaded), "make", lambda self: agent())
-    return "\n".join(str(problem) for problem in trials.trial(loaded, layout).problems)
+    return "\n".join(str(problem) for problem in problems_on(loaded, layout))
 
 
 def test_agents_that_do_not_repeat_themselves_are_told(
@@ -106,5 +105,5 @@ def test_actions_that_are_none_are_told(tmp_path: Path, monkeypatch: pytest.Monk
 
 def test_slow_agents_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     ticks = iter(range(10**6))
-    monkeypatch.setattr(trials.time, "thread_time", lambda: 0.06 * next(ticks))
+    monkeypatch.setattr("time.thread_time", lambda: 0.06 * next(ticks))
     assert "99th percentile 60.0 ms, more than 50 ms" in tried(tmp_path, monkeypatch, Stay)

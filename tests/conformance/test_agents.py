@@ -5,17 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from galley.agents.admission.trial import trial
 from galley.agents.batch import act_all
-from galley.agents.bundle import Bundle
 from galley.agents.catalogue import Catalogue
-from galley.agents.protocol import Agent
-from galley.kitchen import STAY, Kitchen, Layout
+from galley.agents.conformance import check
+from galley.agents.episode import play_episode
 from galley.kitchen.layout_file import find_layout
+from galley.kitchen.trajectory import replay
 from galley.workspace import Workspace
 
 WORKSPACE = Workspace(Path(__file__).resolve().parents[2])
@@ -39,68 +36,25 @@ def cases() -> Iterator[object]:
 
 CASES = list(cases())
 
-Record = list[tuple[NDArray[np.int16], tuple[int, int]]]
-
-
-def seated(bundle: Bundle, layout: Layout, seat: int, seed: int) -> Agent:
-    agent = bundle.make()
-    agent.reset(layout, seat, seed)
-    return agent
-
-
-def played(bundle: Bundle, layout: Layout, seed: int) -> Record:
-    """States and joint actions of an agent beside itself; every seventh action of seat 0 comes too late."""
-    kitchen = Kitchen(layout)
-    pair = [seated(bundle, layout, seat, seed) for seat in (0, 1)]
-    record: Record = []
-    for tick in range(TICKS):
-        state = kitchen.state.copy()
-        wished = [agent.act(state, tick) for agent in pair]
-        joint = (STAY if tick % 7 == 6 else wished[0], wished[1])
-        assert all(type(action) is int and 0 <= action <= 5 for action in wished)
-        kitchen.step(*joint)
-        for agent in pair:
-            agent.observe(state, joint)
-        record.append((state, joint))
-    return record
-
 
 @pytest.mark.parametrize(("name", "layout_name"), CASES)
 def test_agents_keep_their_promises(name: str, layout_name: str) -> None:
-    bundle, layout = CATALOGUE.bundle(name), find_layout(WORKSPACE, layout_name)
-    record = played(bundle, layout, seed=11)
-    again = played(bundle, layout, seed=11)
-    assert [joint for _, joint in again] == [joint for _, joint in record], "equal seeds, equal games"
-
-    taken_over = seated(bundle, layout, 1, 11)
-    used_before = seated(bundle, layout, 0, 5)
-    for state, joint in played(bundle, layout, seed=5)[:40]:
-        used_before.observe(state, joint)
-    used_before.reset(layout, 1, 11)
-    for tick, (state, joint) in enumerate(record):
-        if tick >= TICKS // 2:  # only now is it asked: what it saw must be enough
-            assert taken_over.act(state, tick) == joint[1], "an agent that takes over acts the same"
-            assert used_before.act(state, tick) == joint[1], "reset forgets everything"
-        taken_over.observe(state, joint)
-        used_before.observe(state, joint)
+    assert check(CATALOGUE.bundle(name).make, find_layout(WORKSPACE, layout_name), TICKS).faults == ()
 
 
 @pytest.mark.parametrize(("name", "layout_name"), CASES)
 def test_many_at_once_act_as_each_alone(name: str, layout_name: str) -> None:
     bundle, layout = CATALOGUE.bundle(name), find_layout(WORKSPACE, layout_name)
-    records = [played(bundle, layout, seed) for seed in (1, 2, 3)]
-    agents = [seated(bundle, layout, 1, seed) for seed in (1, 2, 3)]
+    played = [play_episode(layout, (bundle.make(), bundle.make()), seed, TICKS) for seed in (1, 2, 3)]
+    agents = [bundle.make() for _ in played]
+    for agent, seed in zip(agents, (1, 2, 3), strict=True):
+        agent.reset(layout, 1, seed)
     for tick in range(TICKS):
-        states = [record[tick][0] for record in records]
-        joints = [record[tick][1] for record in records]
+        states = [replay(one)[tick] for one in played]
+        joints = [one.joint_actions[tick].tolist() for one in played]
         assert act_all(agents, states, [tick] * 3) == [joint[1] for joint in joints]
         for agent, state, joint in zip(agents, states, joints, strict=True):
-            agent.observe(state, joint)
-
-
-@pytest.mark.parametrize(("name", "layout_name"), CASES)
-def test_the_check_finds_nothing(name: str, layout_name: str) -> None:
-    assert trial(CATALOGUE.bundle(name), find_layout(WORKSPACE, layout_name)).problems == ()
+            agent.observe(state, (joint[0], joint[1]))
 
 
 def test_the_agents_of_the_demo_ship() -> None:

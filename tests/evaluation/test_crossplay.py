@@ -7,17 +7,18 @@ import json
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
 from galley.agents.bundle import load_bundle
-from galley.agents.play import play_in_seats
+from galley.agents.episode import play_episodes
 from galley.cli import app
 from galley.errors import GalleyError
 from galley.evaluation import crossplay
 from galley.evaluation.crossplay import Roster, find_layouts, game_seeds, pairings, play_cells
 from galley.evaluation.entries import Entry
-from galley.evaluation.results import Results
+from galley.evaluation.results import Figure, Results
 from galley.kitchen.layout_file import find_layout
 from galley.workspace import Workspace
 
@@ -94,9 +95,8 @@ def test_scores_are_those_of_the_bundles_and_more_games_begin_with_the_same(home
     assert seeds[:4] == game_seeds(1, (RING, "human-bc", "stay"), 4)
     assert len({*seeds, *game_seeds(2, (RING, "human-bc", "stay"), 9)}) == 18
     assert len({*seeds, *game_seeds(1, (RING, "stay", "human-bc"), 9)}) == 18
-    assert (
-        results.cell(RING, "human-bc", "stay").scores
-        == play_in_seats((clone, stay), layout, seeds[:4]).scores
+    assert results.cell(RING, "human-bc", "stay").scores == tuple(
+        play_episodes(layout, (clone, stay), seeds[:4])
     )
 
 
@@ -217,3 +217,10 @@ def test_a_file_of_something_else_is_refused_and_left_alone(home: Path) -> None:
     assert "room" in out.read_text("utf-8")
     with pytest.raises(GalleyError, match="cannot be read"):
         Results.load(home / "none.json")
+
+
+def test_mean_and_standard_error() -> None:
+    result = Figure.of((0, 20, 40, 60))
+    assert result.mean == 30
+    assert result.standard_error == pytest.approx(np.sqrt(2000 / 3 / 4))
+    assert Figure.of([20]).standard_error == 0

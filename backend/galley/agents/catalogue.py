@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from galley.agents.admission.trial import trial
 from galley.agents.bundle import Bundle, load_bundle
+from galley.agents.conformance import check
 from galley.errors import InvalidFiles, Problem
 from galley.kitchen import Layout
 from galley.kitchen.layout_file import load_layout
@@ -57,7 +57,7 @@ class Catalogue:
                     continue
                 layout = layouts[layout_name]
                 if layout is not None:
-                    problems += trial(bundle, layout).problems
+                    problems += problems_on(bundle, layout)
         return problems
 
     def _layouts(self) -> tuple[dict[str, Layout | None], list[Problem]]:
@@ -72,6 +72,23 @@ class Catalogue:
                 layouts[name] = None
                 problems += error.problems
         return layouts, problems
+
+
+def problems_on(bundle: Bundle, layout: Layout) -> tuple[Problem, ...]:
+    """Every promise that a bundle's agents break on a layout, at its line in agent.yaml."""
+    try:
+        faults = check(bundle.make, layout).faults
+    except InvalidFiles as error:
+        return error.problems
+    place = ("layouts",) if bundle.layouts is None else ("layouts", layout.name)
+    return tuple(
+        bundle.loaded.problem(
+            place,
+            f"on layout '{layout.name}' {fault.what}",
+            f"{fault.fix}, or replace the agent, see docs/add-an-agent.md",
+        )
+        for fault in faults
+    )
 
 
 def _extremes(layouts: Mapping[str, Layout | None]) -> list[str]:

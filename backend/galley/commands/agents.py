@@ -78,27 +78,26 @@ def play(
 ) -> None:
     """Let two agents play each other in both seat orders; print mean scores and standard errors."""
     from galley.agents.catalogue import Catalogue
-    from galley.agents.play import play as play_games
+    from galley.agents.episode import play_both_orders
+    from galley.evaluation.results import Figure
     from galley.kitchen.layout_file import find_layout
     from galley.workspace import Workspace
 
     place = Workspace(workspace)
     catalogue = Catalogue(place)
-    results = play_games(
-        catalogue.bundle(first), catalogue.bundle(second), find_layout(place, layout), games=games, seed=seed
-    )
-    for result in results:
+    bundles = catalogue.bundle(first), catalogue.bundle(second)
+    both = play_both_orders(*bundles, find_layout(place, layout), games, seed)
+    for seats, scores in zip(((first, second), (second, first)), both, strict=True):
+        figure = Figure.of(scores)
         row = {
-            "seats": [result.seat_0, result.seat_1],
+            "seats": seats,
             "layout": layout,
             "games": games,
             "seed": seed,
-            "mean": result.mean,
-            "standard_error": result.standard_error,
+            "mean": figure.mean,
+            "standard_error": figure.standard_error,
         }
-        line = (
-            f"{result.seat_0} + {result.seat_1} on {layout}: {result.mean:.1f} ± {result.standard_error:.1f}"
-        )
+        line = f"{' + '.join(seats)} on {layout}: {figure.mean:.1f} ± {figure.standard_error:.1f}"
         typer.echo(json.dumps(row) if json_ else line)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from galley.agents.bundle import Bundle, load_bundle
 from galley.agents.catalogue import Catalogue
-from galley.agents.play import play_in_seats
+from galley.agents.episode import play_episodes
 from galley.errors import GalleyError
 from galley.evaluation.entries import Entry
 from galley.evaluation.results import Cell, Key, Results
@@ -125,7 +125,7 @@ def play_cells(
     on_start: Callable[[int], None] = lambda cells: None,
     on_done: Callable[[Cell], None] = lambda cell: None,
 ) -> None:
-    """Nothing; adds to `results` every cell that is not there yet with as many games of the same agents.
+    """Add to `results` every cell that is not there yet with as many games of the same agents.
 
     The seeds of a cell's games follow from `seed` and the three names alone, so a cell is the same wherever,
     beside whatever others and in whatever order it is played. `on_start` is told how many cells are to be
@@ -178,14 +178,14 @@ def _play(task: Task, workspace: str, games: int, seed: int) -> Cell:
             "began; give every worker the same workspace"
         )
     key = (layout.name, seats[0].name, seats[1].name)
-    played = play_in_seats(seats, layout, game_seeds(seed, key, games))
+    scores = play_episodes(layout, seats, game_seeds(seed, key, games))
     return Cell(
         layout=layout.name,
         seat_0=task.seats[0],
         seat_1=task.seats[1],
         seed=seed,
         fingerprint=task.fingerprint,
-        scores=played.scores,
+        scores=tuple(scores.tolist()),
     )
 
 

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 import pydantic
+from numpy.typing import ArrayLike
 
 from galley.errors import GalleyError
 from galley.files.whole import write_whole
@@ -46,9 +47,7 @@ class Cell(pydantic.BaseModel):
     @property
     def figure(self) -> Figure:
         """The mean score and its standard error over games."""
-        games = len(self.scores)
-        error = float(np.std(self.scores, ddof=1) / np.sqrt(games)) if games > 1 else 0.0
-        return Figure(float(np.mean(self.scores)), error)
+        return Figure.of(self.scores)
 
 
 class _File(pydantic.BaseModel):
@@ -64,6 +63,13 @@ class Figure:
 
     mean: float
     standard_error: float
+
+    @classmethod
+    def of(cls, scores: ArrayLike) -> Figure:
+        """That of the scores of games; a single one has no error."""
+        each = np.asarray(scores)
+        error = float(np.std(each, ddof=1) / np.sqrt(each.size)) if each.size > 1 else 0.0
+        return cls(float(np.mean(each)), error)
 
     def as_json(self) -> dict[str, float]:
         """As a JSON object."""
@@ -83,7 +89,7 @@ class Results:
         return len(self._cells)
 
     def add(self, cell: Cell) -> None:
-        """Nothing; keeps the cell."""
+        """Keep the cell."""
         self._cells[cell.key] = cell
 
     def get(self, layout: str, seat_0: str, seat_1: str) -> Cell | None:
@@ -110,7 +116,7 @@ class Results:
         return list(dict.fromkeys(cell.layout for cell in self))
 
     def save(self, path: Path) -> None:
-        """Nothing; writes all cells to `path` (JSON), whole or not at all."""
+        """Write all cells to `path` (JSON), whole or not at all."""
         text = json.dumps(_File(cells=list(self)).model_dump(), separators=(",", ":"))
         write_whole(path, text.replace('{"layout"', '\n{"layout"') + "\n")
 
@@ -133,7 +139,7 @@ class Results:
             ) from None
 
     def save_csv(self, path: Path) -> None:
-        """Nothing; writes one row a cell, with the columns of `CSV_COLUMNS`."""
+        """Write one row a cell, with the columns of `CSV_COLUMNS`."""
         text = io.StringIO(newline="")
         writer = csv.DictWriter(text, CSV_COLUMNS, lineterminator="\n")
         writer.writeheader()

@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from galley.agents.catalogue import Catalogue
+from galley.agents.episode import play_episode
 from galley.agents.protocol import Agent
 from galley.compiled.randomness import uniform
 from galley.errors import GalleyError
 from galley.evaluation.summary import figures, spreads
-from galley.kitchen import ACTIONS, Kitchen, Layout
+from galley.kitchen import ACTIONS, Layout
 from galley.kitchen.measures import measures
 from galley.kitchen.trajectory import Trajectory
 from galley.planning.distances import distances
@@ -89,29 +90,31 @@ def play_trials(layout: Layout, team: Team) -> list[Trajectory]:
         pairs = zip(found.joint_actions, found.ticks.tolist(), strict=True)
         return [Trajectory(kitchen, actions[:ticks]) for actions, ticks in pairs]
     catalogue = Catalogue(Workspace(Path(team.workspace)))
-    agents = [catalogue.bundle(team.robot).make(), catalogue.bundle(team.human).make()]
-    if team.robot_seat == 1:
-        agents.reverse()
-    return [
-        Trajectory(kitchen, _play(kitchen, agents, 1 - team.robot_seat, team.epsilon, seed))
-        for seed in seeds.tolist()
-    ]
+    robot = catalogue.bundle(team.robot).make()
+    human = Noisy(catalogue.bundle(team.human).make(), team.epsilon)
+    agents: tuple[Agent, Agent] = (robot, human) if team.robot_seat == 0 else (human, robot)
+    return [play_episode(kitchen, agents, seed) for seed in seeds.tolist()]
 
 
-def _play(layout: Layout, agents: list[Agent], human: int, epsilon: float, seed: int) -> NDArray[np.uint8]:
-    """uint8[T, 2]: the joint actions of one trial, the agents asked tick by tick."""
-    kitchen = Kitchen(layout)
-    for seat, agent in enumerate(agents):
-        agent.reset(layout, seat, seed)
-    played = []
-    while not kitchen.done:
-        state, tick = kitchen.state.copy(), kitchen.tick
-        actions = [agent.act(state, tick) for agent in agents]
-        if epsilon > 0 and uniform(seed, human, tick, NOISE) < epsilon:
-            actions[human] = int(uniform(seed, human, tick, NOISY_ACTION) * len(ACTIONS))
-        joint = (actions[0], actions[1])
-        kitchen.step(*joint)
-        for agent in agents:
-            agent.observe(state, joint)
-        played.append(joint)
-    return np.array(played, dtype=np.uint8).reshape(-1, 2)
+class Noisy:
+    """An agent that takes, with probability `epsilon`, a random action instead of its own."""
+
+    def __init__(self, agent: Agent, epsilon: float) -> None:
+        self._agent, self._epsilon = agent, epsilon
+        self._seat, self._seed = 0, 0
+
+    def reset(self, layout: Layout, seat: int, seed: int) -> None:
+        """Begin an episode, and draw from this seed and seat."""
+        self._seat, self._seed = seat, seed
+        self._agent.reset(layout, seat, seed)
+
+    def act(self, state: NDArray[np.int16], tick: int) -> int:
+        """The agent's action or a random one."""
+        action = self._agent.act(state, tick)
+        if self._epsilon > 0 and uniform(self._seed, self._seat, tick, NOISE) < self._epsilon:
+            return int(uniform(self._seed, self._seat, tick, NOISY_ACTION) * len(ACTIONS))
+        return action
+
+    def observe(self, state: NDArray[np.int16], joint_action: tuple[int, int]) -> None:
+        """Let the agent observe."""
+        self._agent.observe(state, joint_action)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from galley.errors import GalleyError
 from galley.files.whole import write_whole
-from galley.kitchen.codes import ACTIONS, TICK
+from galley.kitchen.codes import ACTIONS, DELIVERIES, TICK
 from galley.kitchen.events import Event, decode
 from galley.kitchen.layout import Layout
 from galley.kitchen.rules import classic as rules
@@ -79,6 +79,11 @@ class Replay:
     def ticks(self) -> int:
         """How many ticks its clock ran: a kitchen whose episode is over does not change any more."""
         return int(self.states[-1, TICK] - self.states[0, TICK])
+
+    @property
+    def score(self) -> int:
+        """The points that its kitchen shows at the end."""
+        return int(self.states[-1, DELIVERIES]) * self.layout.rules.delivery_reward
 
     def to_its_end(self) -> Replay:
         """The same without the joint actions that came after the episode was over."""

@@ -15,9 +15,10 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
 from galley.agents.catalogue import Catalogue
-from galley.agents.protocol import Agent
+from galley.agents.episode import play_episode
+from galley.agents.scripted import Stay
 from galley.errors import GalleyError
-from galley.kitchen import STAY, Kitchen, Layout, warm
+from galley.kitchen import Layout, warm
 from galley.kitchen.layout_file import load_layouts
 from galley.records import Store
 from galley.server.clock import Clock
@@ -179,7 +180,9 @@ def _rehearse(studies: Mapping[str, Study], layouts: Mapping[str, Layout], catal
         bundle = catalogue.bundle(name)
         try:
             for seat in (0, 1):
-                _few_ticks(bundle.make(), layout, seat)
+                agent = bundle.make()
+                agents = (agent, Stay()) if seat == 0 else (Stay(), agent)
+                play_episode(layout, agents, seed=0, ticks=REHEARSED_TICKS)
         except GalleyError:
             raise
         except Exception as error:
@@ -202,14 +205,3 @@ def _agents_of(data: Mapping[str, Any]) -> set[str]:
     lobby = data.get("lobby", {})
     names = {data["agent"], lobby.get("fallback"), lobby.get("dropout")}
     return {name for name in names if name not in NO_AGENTS}
-
-
-def _few_ticks(agent: Agent, layout: Layout, seat: int) -> None:
-    agent.reset(layout, seat, 0)
-    kitchen = Kitchen(layout)
-    for tick in range(min(REHEARSED_TICKS, layout.rules.horizon_ticks)):
-        before = kitchen.state.copy()
-        action = agent.act(before, tick)
-        joint = (action, STAY) if seat == 0 else (STAY, action)
-        kitchen.step(*joint)
-        agent.observe(before, joint)

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from onnx import helper
 
-import galley.agents.admission.trial as trials
 from galley.agents.admission.adding import as_it_is
 from galley.agents.catalogue import Catalogue
 from galley.errors import GalleyError, InvalidFiles
@@ -62,7 +61,7 @@ def test_the_network_of_the_paper_is_let_in_with_a_card(tmp_path: Path) -> None:
 
 def test_all_reasons_are_told_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     ticks = iter(range(10**7))
-    monkeypatch.setattr(trials.time, "thread_time", lambda: 0.06 * next(ticks))
+    monkeypatch.setattr("time.thread_time", lambda: 0.06 * next(ticks))
     nan = written(tmp_path, linear_policy(bias=[0, float("nan"), 0, 0, 0, 0]), "nan.onnx")
     files = {"room": nan, "den": written(tmp_path, linear_policy(features=3, outputs=5)), "hal": nan}
     found = "\n".join(reasons(tmp_path, files, name="a b"))

@@ -9,9 +9,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from galley.agents.admission.trial import findings
 from galley.agents.bundle import Bundle
 from galley.agents.choosing import choose
+from galley.agents.conformance import check
 from galley.agents.network import Network
 from galley.compiled.randomness import uniform
 from galley.errors import GalleyError, InvalidFiles
@@ -54,7 +54,7 @@ def gate(bundle: Bundle, layout: Layout) -> tuple[Figures, tuple[str, ...]]:
     long = layout.with_rules(horizon_ticks=max(GATE_TICKS, layout.rules.horizon_ticks))
     nan = float("nan")
     try:
-        found = findings(bundle, long, GATE_TICKS)
+        found = check(bundle.make, long, GATE_TICKS)
     except InvalidFiles as error:
         nothing = Figures(layout.name, 0, 0, nan, nan, nan, nan)
         return nothing, tuple(problem.message for problem in error.problems)
@@ -69,7 +69,7 @@ def gate(bundle: Bundle, layout: Layout) -> tuple[Figures, tuple[str, ...]]:
         batched_ms,
         apart,
     )
-    return figures, tuple(dict.fromkeys((*found.faults, *faults)))
+    return figures, tuple(dict.fromkeys((*(fault.what for fault in found.faults), *faults)))
 
 
 def probabilities(rows: NDArray[np.floating]) -> bool:

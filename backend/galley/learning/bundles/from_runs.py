@@ -12,8 +12,9 @@ import numpy as np
 
 from galley.agents.bundle import Bundle, describe_network, load_bundle
 from galley.agents.catalogue import Catalogue
-from galley.agents.play import play, play_in_seats
+from galley.agents.episode import play_both_orders, play_episodes
 from galley.errors import GalleyError
+from galley.evaluation.results import Figure
 from galley.files.whole import whole_folder
 from galley.kitchen import Encoder, Layout
 from galley.kitchen.layout_file import find_layout
@@ -111,14 +112,14 @@ def _scores(
     """Mean and standard error with itself, and on seat 0 and seat 1 with each of `PARTNERS`."""
     catalogue = Catalogue(place)
     seeds = np.random.SeedSequence((seed, 1)).generate_state(ITSELF_GAMES, np.uint64).tolist()
-    own = play_in_seats((bundle, bundle), layout, seeds)
-    found: dict[str, Any] = {"itself": [own.mean, own.standard_error, own.games]}
+    own = Figure.of(play_episodes(layout, (bundle, bundle), seeds))
+    found: dict[str, Any] = {"itself": [own.mean, own.standard_error, ITSELF_GAMES]}
     told = [f"itself {own.mean:.1f}"]
     for partner, games in PARTNERS.items():
         if partner not in catalogue.names() or not catalogue.bundle(partner).supports(layout.name):
             continue
-        results = play(bundle, catalogue.bundle(partner), layout, games, seed)
-        found[partner] = [[one.mean, one.standard_error, one.games] for one in results]
+        results = [*map(Figure.of, play_both_orders(bundle, catalogue.bundle(partner), layout, games, seed))]
+        found[partner] = [[one.mean, one.standard_error, games] for one in results]
         told.append(f"{partner} {results[0].mean:.1f} / {results[1].mean:.1f}")
     tell(f"{layout.name}: {', '.join(told)}")
     return found

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from galley.kitchen.codes import DELIVERIES
 from galley.kitchen.events import decode
 from galley.kitchen.trajectory import Replay, play
 from galley.protocol.scene import Scene, happenings
@@ -46,7 +45,7 @@ def replay_document(row: RoundRow, ticks: Mapping[int, Mapping[str, Any]], after
                 }
             )
         first += len(replay.out)
-        score += int(replay.states[-1, DELIVERIES]) * layout.rules.delivery_reward
+        score += replay.score
     return {
         "status": row.status,
         "from": min(after, first),

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from galley.agents.bundle import Bundle
+from galley.agents.episode import take_up
 from galley.agents.protocol import Agent
 from galley.kitchen import Layout
 from galley.kitchen.trajectory import Trajectory, episodes_of
@@ -37,12 +38,7 @@ def ready_agent(
     seen = joint_actions[len(joint_actions) - course.kitchen.tick :]
     try:
         agent: Agent = bundle.make()
-        agent.reset(layout, seat, seeds[course.episode - 1])
-        again = Course(layout)
-        for first, second in seen.tolist():
-            before = again.kitchen.state.copy()
-            again.step(first, second)
-            agent.observe(before, (first, second))
+        take_up(agent, layout, seat, seeds[course.episode - 1], seen)
     except Exception:  # whatever a researcher's agent raises, the round goes on
         LOG.exception("agent %s cannot take up a round on layout %s", bundle.name, layout.name)
         return Unable()
