@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from galley.agents import choosing
 from galley.errors import GalleyError
 from galley.kitchen import Encoder, Kitchen, KitchenBatch
 from galley.learning.ppo.forwards import Machine
@@ -114,3 +115,12 @@ def test_derived_seeds_differ_by_any_part() -> None:
     seeds = {derived_seed(*parts) for parts in ((1,), (2,), (1, 0), (1, 1), (1, 1, 0), (-1,), (1 << 40,))}
     assert len(seeds) == 7
     assert all(0 <= seed < 1 << 63 for seed in seeds)
+
+
+def test_training_draws_actions_as_agents_do() -> None:
+    generator = np.random.default_rng(6)
+    logits = generator.normal(0, 2, (2000, 6)).astype(np.float32)
+    draws = generator.random(2000, dtype=np.float32)
+    here = choose(torch.from_numpy(logits), torch.from_numpy(draws)).numpy()
+    there = choosing.choose(logits, np.zeros(logits.shape, dtype=np.bool_), draws.astype(np.float64))
+    assert here.tolist() == there.tolist()

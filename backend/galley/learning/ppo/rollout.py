@@ -218,7 +218,10 @@ class Episodes:
 
 
 def choose(logits: torch.Tensor, draws: torch.Tensor) -> torch.Tensor:
-    """int64 [B]: an action for each row of `logits` [B, 6], by inversion with `draws` [B] in [0, 1)."""
+    """int64 [B]: an action for each row of `logits` [B, 6], by inversion with `draws` [B] in [0, 1).
+
+    What `galley.agents.choosing.choose` does with nothing barred, in tensors that stay on their device.
+    """
     reached = torch.softmax(logits, dim=1).cumsum(dim=1)
     return (reached[:, :-1] <= draws.unsqueeze(1)).sum(dim=1)
 
