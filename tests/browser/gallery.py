@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from galley.server.templates import templates
+from galley.server.templates import translated_templates
 from galley.study.study import load_study
 from galley.study.written.languages import choose_language
 from galley.study.written.questionnaire import Questionnaire
@@ -298,7 +298,7 @@ def gallery(language: str) -> dict[str, tuple[str, dict[str, Any]]]:
 
 def rendered(language: str) -> dict[str, Callable[[], str]]:
     """Every page of the gallery as HTML, by its path: `/` and its name."""
-    environment = templates(str(FRONTEND / "templates"))
+    environment = translated_templates(str(FRONTEND / "templates"))
 
     def page(template: str, values: Mapping[str, Any]) -> Callable[[], str]:
         return lambda: environment.get_template(template).render(**values)

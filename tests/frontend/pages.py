@@ -6,7 +6,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
-from galley.server.templates import templates
+from galley.server.templates import translated_templates
 from galley.study.written.questionnaire import Questionnaire
 from galley.study.written.recruitment import VISIT_OUTCOMES
 
@@ -110,7 +110,9 @@ def contexts(words: str = HOSTILE) -> dict[str, dict[str, Any]]:
 def render(name: str, words: str = HOSTILE, **changes: Any) -> str:
     """A template with its context, some of it changed."""
     return (
-        templates(str(FRONTEND / "templates")).get_template(name).render(**(contexts(words)[name] | changes))
+        translated_templates(str(FRONTEND / "templates"))
+        .get_template(name)
+        .render(**(contexts(words)[name] | changes))
     )
 
 

@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 import pytest
 
 from galley.kitchen.codes import THINGS
-from galley.server.templates import templates
+from galley.server.templates import translated_templates
 from galley.study.written.study_file import HATS
 from galley.study.written.texts import PICTURES, TILES
 from tests.frontend.pages import FRONTEND, Page
@@ -55,7 +55,7 @@ def test_every_hat_of_a_study_is_drawn_in_its_own_colour_and_mark() -> None:
 
 @pytest.mark.parametrize("language", ["en", "zh"])
 def test_every_hat_has_a_word_of_its_own_in_every_language(language: str) -> None:
-    page = templates(str(FRONTEND / "templates")).get_template("_hats.html")
+    page = translated_templates(str(FRONTEND / "templates")).get_template("_hats.html")
     hats: Any = page.make_module({"language": language})
     words = {hats.word(name) for name in HATS}
     names = {Page(hats.partner(name, "1")).texts[-1] for name in HATS}

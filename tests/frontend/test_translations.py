@@ -10,7 +10,7 @@ import pytest
 from babel.messages.extract import extract_from_file
 from babel.messages.pofile import read_po
 
-from galley.server.templates import templates
+from galley.server.templates import translated_templates
 from galley.translations import FOLDER, KEYWORDS, Catalogues, Translator, language_name, mark
 from tests.frontend.pages import FRONTEND, OUTCOMES, Page, contexts
 
@@ -107,7 +107,9 @@ def _pages() -> Iterator[tuple[str, str, dict[str, object]]]:
 @pytest.mark.parametrize(("template", "values"), [pytest.param(*page[1:], id=page[0]) for page in _pages()])
 def test_no_word_reaches_a_participant_past_the_catalogue(template: str, values: dict[str, object]) -> None:
     catalogues = Catalogues([Marking()])
-    page = Page(templates(str(FRONTEND / "templates"), catalogues).get_template(template).render(**values))
+    page = Page(
+        translated_templates(str(FRONTEND / "templates"), catalogues).get_template(template).render(**values)
+    )
     told = [text for tag, text in page.texts if tag not in ("script", "style")]
     told += [value for _, attrs in page.tags for key, value in attrs.items() if key in SAID_ALOUD]
     assert OPENED in "".join(told) or template == "plain.html"

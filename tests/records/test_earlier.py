@@ -21,7 +21,7 @@ import pytest
 
 from galley.kitchen.measures import measures
 from galley.kitchen.trajectory import read
-from galley.records.export.sheets import SHEETS
+from galley.records.export.columns import SHEETS
 from tests import serving
 from tests.records.earlier import lived
 from tests.records.earlier.lived import FrontDoor, Office, Person

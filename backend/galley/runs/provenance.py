@@ -22,9 +22,7 @@ def origin(device: str) -> dict[str, str]:
         "commit": _commit(),
         "galley": _version("galley"),
         "torch": torch.__version__,
-        "processor": f"{torch.cuda.get_device_name()} and {_processor()}"
-        if device == "cuda"
-        else _processor(),
+        "processor": processor,
     }
 
 

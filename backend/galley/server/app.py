@@ -24,7 +24,7 @@ from galley.records import Store
 from galley.server.clock import Clock
 from galley.server.garbage_collection import collect_between_rounds, few_collections
 from galley.server.headers import HEADERS, SecureHeaders
-from galley.server.participant.pages import NO_PAGE, NOT_FOUND, Pages, templates
+from galley.server.participant.pages import NO_PAGE, NOT_FOUND, Pages
 from galley.server.participant.time_limits import TimeLimits
 from galley.server.participant.visits import Visits
 from galley.server.researcher.routes import researcher_pages
@@ -34,6 +34,7 @@ from galley.server.rounds.play_socket import Play
 from galley.server.rounds.set_up import round_layout
 from galley.server.rounds.thinking import Thinking
 from galley.server.settings import Settings
+from galley.server.templates import translated_templates
 from galley.study.study import Study, load_study
 from galley.study.visit.condition_slots import cells
 from galley.study.visit.plan import plan_visit, visit_seed
@@ -76,7 +77,7 @@ def create_app(workspace: Workspace, store: Store, settings: Settings, *, previe
     visits = Visits(store, studies, clock, catalogues, preview=preview)
     matches = Matches(store, visits, catalogue, layouts, thinking, clock, settings.reached_at)
     frontend = frontend_folder()
-    environment = templates(str(frontend / "templates"), catalogues)
+    environment = translated_templates(str(frontend / "templates"), catalogues)
     pages = Pages(
         studies,
         visits,

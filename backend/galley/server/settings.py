@@ -4,67 +4,60 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 from galley.errors import GalleyError
 
-
-@dataclass(frozen=True, slots=True)
-class Setting:
-    """One row: field of Settings, environment variable, what it is for, and bounds when it is a number."""
-
-    name: str
-    env: str
-    about: str
-    low: int | None = None
-    high: int | None = None
-
-
-SETTINGS: tuple[Setting, ...] = (
-    Setting("host", "HOST", "Address to listen on; 0.0.0.0 lets other machines in."),
-    Setting("port", "PORT", "Port to listen on; 0 takes any free one.", 0, 65535),
-    Setting("database", "DATABASE", "Database URL; empty means SQLite in the workspace."),
-    Setting(
-        "reached_at",
-        "REACHED_AT",
-        "HOST:PORT at which other replicas reach this one; empty finds it out. SQLite needs none.",
-    ),
-    Setting("study", "STUDY", "The one study to serve; empty serves all of the workspace."),
-    Setting(
-        "think_window_ms",
-        "THINK_WINDOW_MS",
-        "How far apart batches of agents' decisions begin at least, ms.",
-        0,
-        50,
-    ),
-    Setting("max_form_kib", "MAX_FORM_KIB", "Largest form that is read, KiB.", 1, 10_240),
-    Setting(
-        "messages_per_s",
-        "MESSAGES_PER_S",
-        "Websocket messages a second that one connection may keep up.",
-        10,
-        10_000,
-    ),
-    Setting("log_level", "LOG_LEVEL", "How much is logged: error, warning, info or debug."),
-)
 REACHED_AT = re.compile(r"([A-Za-z0-9._-]+|\[[0-9A-Fa-f:.]+\]):[0-9]{1,5}")
 LOG_LEVELS = ("error", "warning", "info", "debug")
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
-    """Everything about a serving process that is not in the workspace; see SETTINGS for each."""
+class Setting:
+    """A row of the table: field of Settings, environment variable, default, meaning, bounds of a number."""
 
-    host: str = "127.0.0.1"
-    port: int = 8000
-    database: str = ""
-    reached_at: str = ""
-    study: str = ""
-    think_window_ms: int = 10
-    max_form_kib: int = 256
-    messages_per_s: int = 200
-    log_level: str = "warning"
+    name: str
+    env: str
+    default: str | int
+    about: str
+    low: int | None = None
+    high: int | None = None
+
+
+def _row(default: Any, env: str, about: str, low: int | None = None, high: int | None = None) -> Any:
+    more = {"default": default, "env": env, "about": about, "low": low, "high": high}
+    return field(default=default, metadata=more)
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """Everything about a serving process that is not in the workspace."""
+
+    host: str = _row("127.0.0.1", "HOST", "Address to listen on; 0.0.0.0 lets other machines in.")
+    port: int = _row(8000, "PORT", "Port to listen on; 0 takes any free one.", 0, 65535)
+    database: str = _row("", "DATABASE", "Database URL; empty means SQLite in the workspace.")
+    reached_at: str = _row(
+        "",
+        "REACHED_AT",
+        "HOST:PORT at which other replicas reach this one; empty finds it out. SQLite needs none.",
+    )
+    study: str = _row("", "STUDY", "The one study to serve; empty serves all of the workspace.")
+    think_window_ms: int = _row(
+        10, "THINK_WINDOW_MS", "How far apart batches of agents' decisions begin at least, ms.", 0, 50
+    )
+    max_form_kib: int = _row(256, "MAX_FORM_KIB", "Largest form that is read, KiB.", 1, 10_240)
+    messages_per_s: int = _row(
+        200,
+        "MESSAGES_PER_S",
+        "Websocket messages a second that one connection may keep up.",
+        10,
+        10_000,
+    )
+    log_level: str = _row("warning", "LOG_LEVEL", "How much is logged: error, warning, info or debug.")
+
+
+SETTINGS: tuple[Setting, ...] = tuple(Setting(row.name, **row.metadata) for row in fields(Settings))
 
 
 def read_settings(environ: Mapping[str, str], **options: Any) -> Settings:
@@ -72,8 +65,7 @@ def read_settings(environ: Mapping[str, str], **options: Any) -> Settings:
 
     Raises: GalleyError naming the setting, its value and what it may be.
     """
-    known = {field.name for field in fields(Settings)}
-    if unknown := set(options) - known:
+    if unknown := set(options) - {setting.name for setting in SETTINGS}:
         raise TypeError(f"no such setting: {', '.join(sorted(unknown))}")
     chosen: dict[str, Any] = {}
     for setting in SETTINGS:
@@ -106,10 +98,8 @@ def _checked(setting: Setting, origin: str, value: Any) -> str | int:
 
 def settings_table() -> str:
     """The settings as a Markdown table, for docs/settings.md."""
-    defaults = Settings()
     lines = ["| option | environment | default | meaning |", "|---|---|---|---|"]
     for setting in SETTINGS:
-        default = getattr(defaults, setting.name)
-        shown = "" if default == "" else f"`{default}`"
+        shown = "" if setting.default == "" else f"`{setting.default}`"
         lines.append(f"| `{setting.name}` | `{setting.env}` | {shown} | {setting.about} |")
     return "\n".join(lines) + "\n"

@@ -1,4 +1,4 @@
-"""The environment that renders the pages, each in the language of the visit."""
+"""What renders the pages: participants' in the language of the visit, researchers' in English."""
 
 from __future__ import annotations
 
@@ -8,20 +8,24 @@ from jinja2.runtime import Context
 from galley.translations import SOURCE, Catalogues, Translator
 
 
-def templates(folder: str, catalogues: Catalogues | None = None) -> jinja2.Environment:
-    """The templates of a folder; everything put into them is escaped unless it is marked as HTML.
-
-    A template speaks the language whose code it is given as `language`, English if it is given none.
-    Without `catalogues` those that are shipped are read.
-    """
-    environment = jinja2.Environment(
+def templates(folder: str) -> jinja2.Environment:
+    """The templates of a folder; everything put into them is escaped unless it is marked as HTML."""
+    return jinja2.Environment(
         loader=jinja2.FileSystemLoader(folder),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
-        extensions=["jinja2.ext.i18n"],
     )
+
+
+def translated_templates(folder: str, catalogues: Catalogues | None = None) -> jinja2.Environment:
+    """The same, each in the language whose code it is given as `language`, English if it is given none.
+
+    Without `catalogues` those that are shipped are read.
+    """
+    environment = templates(folder)
+    environment.add_extension("jinja2.ext.i18n")
     known = Catalogues.load() if catalogues is None else catalogues
 
     def translator(context: Context) -> Translator:

@@ -66,7 +66,7 @@ def test_rounds_go_on_while_the_database_restarts(server: postgres.Postgres, url
 
 
 def test_who_waits_too_long_is_told_so_and_the_journal_is_kept(server: postgres.Postgres, url: str) -> None:
-    with Store.open(url, flush_every_s=0.05, patience_s=0.3) as store:
+    with Store.open(url, flush_every_s=0.05, retry_for_s=0.3) as store:
         visit = begin(store)
         round_id = open_round(store, visit)
         server.stop()

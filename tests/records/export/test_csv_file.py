@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from galley.records.export.columns import Field, Sheet
 from galley.records.export.csv_file import FORMULA_STARTS, CsvFile, cell, guarded, utc
-from galley.records.export.sheets import Field, Sheet
 
 SHEET = Sheet("notes", "Notes.", "none", (Field("who", "text", "who"), Field("at", "time", "when")))
 

@@ -7,9 +7,9 @@ import io
 from pathlib import Path
 
 from galley.records.database.tables import METADATA
+from galley.records.export.columns import SHEETS
 from galley.records.export.data_dictionary import dictionary_csv, dictionary_markdown
 from galley.records.export.human_data import HUMAN_DATA
-from galley.records.export.sheets import SHEETS
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "data-dictionary.md"
 

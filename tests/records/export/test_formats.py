@@ -13,8 +13,8 @@ import pytest
 from galley.errors import GalleyError
 from galley.kitchen.trajectory import from_text
 from galley.records import Store
+from galley.records.export.columns import SHEETS
 from galley.records.export.human_data import HUMAN_DATA
-from galley.records.export.sheets import SHEETS
 from galley.records.export.study_export import export_study
 from galley.records.export.trajectory_export import export_human_data, export_trajectories
 from tests.overcooked_package import mdp

@@ -13,7 +13,7 @@ from galley.errors import GalleyError
 from galley.kitchen import ACTIONS
 from galley.kitchen.trajectory import replay
 from galley.records import PauseRow, Store, TickRow, VisitRow
-from galley.records.export.sheets import SHEETS, WIDE
+from galley.records.export.columns import SHEETS, WIDE
 from galley.records.export.study_export import export_study
 from galley.study.written.questionnaire import Questionnaire
 from tests.records.helpers import START_MS, begin, joint_actions, one_soup, open_round, play, tick_rows

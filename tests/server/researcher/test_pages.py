@@ -13,7 +13,7 @@ import pytest
 
 from galley.kitchen.trajectory import from_text
 from galley.records.reading import overview
-from galley.server.researcher import tallies
+from galley.server.researcher import counts
 from galley.server.researcher.downloads import DOWNLOADS
 from galley.server.researcher.export_process import write_export
 from galley.server.researcher.visit_pages import LONGEST_NOTE
@@ -308,7 +308,7 @@ def test_arrivals_are_counted_by_when_they_began() -> None:
     hour = 3_600_000
     start = 1_790_000_000_000 // hour * hour
     began = [(start + 5, "completed"), (start + hour - 1, "active"), (start + 30 * hour, "timed_out")]
-    found = tallies.arrivals(began)
+    found = counts.arrivals(began)
     assert (found["span"], len(found["rows"])) == ("an hour", 31)
     kept = [
         (row["from_ms"], row["came"], row["done"], row["here"], row["gone"])
@@ -316,11 +316,11 @@ def test_arrivals_are_counted_by_when_they_began() -> None:
         if row["came"]
     ]
     assert kept == [(start, 2, 1, 1, 0), (start + 30 * hour, 1, 0, 0, 1)]
-    assert tallies.arrivals(began[:2])["span"] == "10 minutes"
+    assert counts.arrivals(began[:2])["span"] == "10 minutes"
     long_after = (start + 40_000 * 24 * hour, "active")
-    years = tallies.arrivals([*began, long_after])
+    years = counts.arrivals([*began, long_after])
     assert (years["span"], sum(row["came"] for row in years["rows"])) == ("364 days", 4)
-    assert tallies.arrivals([])["rows"] == []
+    assert counts.arrivals([])["rows"] == []
 
 
 def test_arrivals_are_shown_as_a_chart_and_a_table_without_tests(office: Office) -> None:

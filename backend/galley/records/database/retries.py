@@ -10,12 +10,12 @@ from sqlalchemy.exc import DBAPIError, OperationalError
 
 from galley.errors import GalleyError
 
-PATIENCE_S = 20.0
+RETRY_FOR_S = 20.0
 FIRST_WAIT_S = 0.05
 LONGEST_WAIT_S = 1.0
 
 
-class Patience:
+class Retries:
     """Waits between tries, a little longer each time, until `until_s` (monotonic) or `closing`.
 
     SQLite has no tries but the one: its driver has waited for the lock already.
@@ -36,9 +36,9 @@ class Patience:
         self._wait_s = min(2 * self._wait_s, LONGEST_WAIT_S)
         return True
 
-    def verdict(self, error: BaseException) -> BaseException:
+    def failure(self, error: BaseException) -> BaseException:
         """What to tell whoever waited in vain."""
-        if self._server and passes(error):
+        if self._server and is_transient(error):
             return GalleyError(f"the records cannot be reached: {one_line(error)}")
         return error
 
@@ -49,7 +49,7 @@ def one_line(error: BaseException) -> str:
     return " ".join(str(cause).split()) or type(cause).__name__
 
 
-def passes(error: BaseException) -> bool:
+def is_transient(error: BaseException) -> bool:
     """Whether trying again may help: the database was away, busy or full, rather than the rows wrong."""
     cut_off = isinstance(error, DBAPIError) and error.connection_invalidated
     return cut_off or isinstance(error, OperationalError)

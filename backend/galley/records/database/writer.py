@@ -17,7 +17,7 @@ from galley.errors import GalleyError
 from galley.records.database import leases
 from galley.records.database.journal_rows import Journal, JournalInserts
 from galley.records.database.leases import Lease
-from galley.records.database.retries import PATIENCE_S, Patience, one_line, passes
+from galley.records.database.retries import RETRY_FOR_S, Retries, is_transient, one_line
 from galley.records.rows import Health
 
 T = TypeVar("T")
@@ -44,12 +44,12 @@ class Writer:
     """Owns every write of a process. Its methods return at once and may be called from any thread."""
 
     def __init__(
-        self, engine: Engine, flush_every_s: float = FLUSH_EVERY_S, patience_s: float = PATIENCE_S
+        self, engine: Engine, flush_every_s: float = FLUSH_EVERY_S, retry_for_s: float = RETRY_FOR_S
     ) -> None:
         self._engine = engine
         self._inserts = JournalInserts(engine)
         self._flush_every_s = flush_every_s
-        self._patience_s = patience_s
+        self._retry_for_s = retry_for_s
         self._jobs: SimpleQueue[_Job | None] = SimpleQueue()
         self._lock = threading.Lock()
         self._waiting: dict[int, Journal] = {}
@@ -170,7 +170,7 @@ class Writer:
             return [lease for lease in self._leases.values() if lease.renew_at_s <= now_s]
 
     def _do(self, job: _Job) -> None:
-        patience = Patience(self._engine, job.born_s + self._patience_s, self._closing)
+        retries = Retries(self._engine, job.born_s + self._retry_for_s, self._closing)
         while True:
             try:
                 if job.first is not None and not self._flush(job.first):
@@ -181,15 +181,15 @@ class Writer:
                         result = job.work(connection)
                     self._trouble = ""
             except _Unwritten:
-                if patience.wait():
+                if retries.wait():
                     continue
                 job.done.set_exception(GalleyError(f"the records cannot be written: {self._trouble}"))
             except BaseException as error:  # handed to whoever waits for the job; the thread must live on
-                if passes(error):
+                if is_transient(error):
                     self._trouble = one_line(error)
-                    if patience.wait():
+                    if retries.wait():
                         continue
-                job.done.set_exception(patience.verdict(error))
+                job.done.set_exception(retries.failure(error))
             else:
                 job.done.set_result(result)
             return
@@ -218,7 +218,7 @@ class Writer:
                 renewing = [lease for lease in due if lease.round_id not in gone]
                 lost += leases.renew(connection, renewing)
         except Exception as error:  # any fault here must leave the rows somewhere
-            if passes(error):
+            if is_transient(error):
                 self._put_back(batch, due, one_line(error))
                 return False
             if not batch:

@@ -9,8 +9,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import IO, Any
 
+from galley.records.export.columns import Kind, Sheet
 from galley.records.export.sheet_file import PartFile
-from galley.records.export.sheets import Kind, Sheet
 
 # Spreadsheets take a cell that begins so for a formula. Source: OWASP, "CSV Injection".
 # The apostrophe is among them so that a guarded text is always told from one that began with it.

@@ -12,8 +12,8 @@ import sys
 from collections.abc import Iterator
 
 from galley.records.database.tables import METADATA
+from galley.records.export.columns import SHEETS
 from galley.records.export.human_data import HUMAN_DATA
-from galley.records.export.sheets import SHEETS
 
 _INTRO = """# Data dictionary
 

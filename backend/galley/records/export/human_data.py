@@ -13,7 +13,7 @@ from typing import Any, Final
 from galley.kitchen import Layout
 from galley.kitchen.codes import INGREDIENTS_PER_SOUP, ONION_SOUP, THINGS, TOMATO_SOUP
 from galley.kitchen.state import ChefView, KitchenView, PotView, view
-from galley.records.export.sheets import Field, Sheet
+from galley.records.export.columns import Field, Sheet
 from galley.records.reading.round_replay import Replayed
 from galley.records.rows import RoundRow
 

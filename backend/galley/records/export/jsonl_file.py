@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from galley.records.export.columns import Kind, Sheet
 from galley.records.export.csv_file import utc
 from galley.records.export.sheet_file import PartFile
-from galley.records.export.sheets import Kind, Sheet
 
 
 def plain(kind: Kind, value: Any) -> Any:

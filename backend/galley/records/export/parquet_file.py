@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from galley.errors import GalleyError
+from galley.records.export.columns import Kind, Sheet
 from galley.records.export.sheet_file import PartFile
-from galley.records.export.sheets import Kind, Sheet
 
 ROWS_A_GROUP = 20_000
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)

@@ -12,7 +12,7 @@ from sqlalchemy import Connection
 from galley.errors import GalleyError
 from galley.kitchen import ACTIONS
 from galley.records.database.tables import CLOCKS, KEYS, PAUSES, TICKS
-from galley.records.export.sheets import (
+from galley.records.export.columns import (
     CLOCKS_SHEET,
     EVENTS_SHEET,
     KEYS_SHEET,

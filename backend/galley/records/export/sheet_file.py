@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import Any, ClassVar, Self
 
 from galley.files.whole import whole_path
-from galley.records.export.sheets import Sheet
+from galley.records.export.columns import Sheet
 
 
 class PartFile(ABC):

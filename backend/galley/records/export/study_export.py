@@ -12,13 +12,7 @@ from sqlalchemy import Connection, func, select
 from galley.errors import GalleyError
 from galley.files.whole import write_whole
 from galley.records.database.tables import ABSENCES, ATTEMPTS, NOTES, RESPONSES, STAGES
-from galley.records.export.csv_file import CsvFile
-from galley.records.export.data_dictionary import dictionary_csv, dictionary_markdown
-from galley.records.export.jsonl_file import JsonLinesFile
-from galley.records.export.parquet_file import ParquetFile
-from galley.records.export.round_export import RoundExport
-from galley.records.export.sheet_file import PartFile
-from galley.records.export.sheets import (
+from galley.records.export.columns import (
     ABSENCES_SHEET,
     ATTEMPTS_SHEET,
     NOTES_SHEET,
@@ -28,6 +22,12 @@ from galley.records.export.sheets import (
     STAGES_SHEET,
     WIDE,
 )
+from galley.records.export.csv_file import CsvFile
+from galley.records.export.data_dictionary import dictionary_csv, dictionary_markdown
+from galley.records.export.jsonl_file import JsonLinesFile
+from galley.records.export.parquet_file import ParquetFile
+from galley.records.export.round_export import RoundExport
+from galley.records.export.sheet_file import PartFile
 from galley.records.export.wide_sheet import Wide
 from galley.records.reading.flags import Flag, flags
 from galley.records.rows import RoundRow, VisitRow

@@ -9,7 +9,7 @@ from typing import Any
 from sqlalchemy import Connection, select
 
 from galley.records.database.tables import QUESTIONS
-from galley.records.export.sheets import ROUND_COLUMNS, WIDE, Field
+from galley.records.export.columns import ROUND_COLUMNS, WIDE, Field
 from galley.records.rows import RoundRow, VisitRow
 
 

@@ -93,11 +93,6 @@ class Researchers:
         gone = delete(SESSIONS).where(SESSIONS.c.token_sha256 == _hash(token))
         return self._store.write(lambda connection: connection.execute(gone).rowcount == 1)
 
-    def close_sessions(self, researcher_id: int) -> Future[int]:
-        """How many sessions the researcher had; they are gone now."""
-        gone = delete(SESSIONS).where(SESSIONS.c.researcher_id == researcher_id)
-        return self._store.write(lambda connection: int(connection.execute(gone).rowcount))
-
 
 def _find(connection: Connection, name: str) -> ResearcherRow | None:
     found = connection.execute(select(RESEARCHERS).where(RESEARCHERS.c.name == name)).mappings().one_or_none()

@@ -8,11 +8,11 @@ from typing import Self
 from galley.errors import GalleyError
 from galley.records.database.engine import connect, database_url, shown, sqlite_file
 from galley.records.database.migrate import migrate
-from galley.records.database.retries import PATIENCE_S
+from galley.records.database.retries import RETRY_FOR_S
 from galley.records.database.serving_lock import serving_lock
 from galley.records.database.writer import FLUSH_EVERY_S
-from galley.records.store.store_rounds import RoundStore
-from galley.records.store.store_visits import VisitStore
+from galley.records.store.round_store import RoundStore
+from galley.records.store.visit_store import VisitStore
 
 
 class Store(VisitStore, RoundStore):
@@ -30,11 +30,11 @@ class Store(VisitStore, RoundStore):
         serving: bool = False,
         must_exist: bool = False,
         flush_every_s: float = FLUSH_EVERY_S,
-        patience_s: float = PATIENCE_S,
+        retry_for_s: float = RETRY_FOR_S,
     ) -> Self:
         """The store in `database` (a URL or the path of an SQLite file), made or migrated as needed.
 
-        `flush_every_s` is the most that the journal waits, `patience_s` how long writes and reads wait for a
+        `flush_every_s` is the most that the journal waits, `retry_for_s` how long writes and reads wait for a
         database server that is away.
         Raises: GalleyError if it cannot be opened, is newer than this Galley, does not exist though it must,
         or is to be served and is served already.
@@ -59,7 +59,7 @@ class Store(VisitStore, RoundStore):
                 raise GalleyError(f"{file}: {error.strerror or error}; {fix}") from None
             raise
         reader = connect(url, writes=False)
-        return cls(shown(url), connect(url, writes=True), reader, lock, flush_every_s, patience_s)
+        return cls(shown(url), connect(url, writes=True), reader, lock, flush_every_s, retry_for_s)
 
     def __enter__(self) -> Self:
         return self

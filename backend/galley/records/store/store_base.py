@@ -12,7 +12,7 @@ from typing import Literal, TypeVar
 from sqlalchemy import Connection, Engine
 
 from galley.files.lock import FileLock
-from galley.records.database.retries import Patience, passes
+from galley.records.database.retries import Retries, is_transient
 from galley.records.database.writer import Writer
 from galley.records.rows import Health
 
@@ -30,15 +30,15 @@ class StoreBase:
         reader: Engine,
         lock: FileLock | None,
         flush_s: float,
-        patience_s: float,
+        retry_for_s: float,
     ) -> None:
         self.name = name
         self._engine = engine
         self._reader = reader
         self._lock = lock
-        self._patience_s = patience_s
+        self._retry_for_s = retry_for_s
         self._closing = threading.Event()
-        self._writer = Writer(engine, flush_s, patience_s)
+        self._writer = Writer(engine, flush_s, retry_for_s)
         self._readers = ThreadPoolExecutor(READERS, thread_name_prefix="galley-reader")
 
     @property
@@ -59,16 +59,16 @@ class StoreBase:
     def read(self, query: Callable[[Connection], T]) -> Future[T]:
         """The result of `query` on the database as it stands; tried again while that is away."""
 
-        def run(until_s: float = time.monotonic() + self._patience_s) -> T:
-            patience = Patience(self._reader, until_s, self._closing)
+        def run(until_s: float = time.monotonic() + self._retry_for_s) -> T:
+            retries = Retries(self._reader, until_s, self._closing)
             while True:
                 try:
                     with self.reading() as connection:
                         return query(connection)
                 except Exception as error:
-                    if passes(error) and patience.wait():
+                    if is_transient(error) and retries.wait():
                         continue
-                    raise patience.verdict(error) from None
+                    raise retries.failure(error) from None
 
         return self._readers.submit(run)
 

@@ -88,7 +88,7 @@ def seen(connection: Connection, visit_id: int, at_ms: int) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Left:
+class LeftStep:
     """A step that is left: its answers as rows without visit, step and time, and where the visit goes."""
 
     visit_id: int
@@ -101,7 +101,7 @@ class Left:
     consent_sha256: str | None
 
 
-def leave_step(connection: Connection, left: Left) -> bool:
+def leave_step(connection: Connection, left: LeftStep) -> bool:
     """Store the answers and move on, unless the step was left before or the visit is over.
 
     Raises: GalleyError if the visit is unknown.

@@ -13,7 +13,7 @@ from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Resp
 from galley.errors import GalleyError
 from galley.records import Store
 from galley.server.clock import Clock
-from galley.server.form_reading import FormError, read_form
+from galley.server.form_decoding import FormError, read_form
 from galley.server.headers import same_origin
 from galley.server.participant.step_context import (
     common_context,
@@ -28,7 +28,6 @@ from galley.server.participant.visits import GRACE_S, TEST_PARAM, Visit, Visits
 from galley.server.rounds.lobby import Lobby, Meeting
 from galley.server.rounds.matches import Matches, RoundBusy
 from galley.server.rounds.relay import RELAYED, hand_over
-from galley.server.templates import templates as templates
 from galley.study.study import Study
 from galley.study.visit.plan import Step
 from galley.study.visit.progress import (

@@ -10,7 +10,7 @@ from weakref import WeakValueDictionary
 
 from galley.records import Arrival, Planned, Store, VisitRow
 from galley.records.store.links_for_tests import LinkForTests, LinksForTests
-from galley.records.store.visit_standing import Attempt, standing
+from galley.records.store.visit_state import Attempt, visit_state
 from galley.server.clock import Clock
 from galley.study.study import Study
 from galley.study.visit.condition_slots import allocate, capacity, cell_number, cells, slot_in_cell
@@ -203,7 +203,7 @@ class Visits:
 
     async def find(self, token: str) -> Visit | None:
         """The visit behind a link; None when there is none or its study is not served."""
-        found = await asyncio.wrap_future(self._store.read(lambda connection: standing(connection, token)))
+        found = await asyncio.wrap_future(self._store.read(lambda connection: visit_state(connection, token)))
         study = None if found is None else self._studies.get(found.visit.study)
         if found is None or study is None:
             return None

@@ -21,7 +21,7 @@ from galley.errors import GalleyError
 from galley.film.write import can_draw
 from galley.records.rows import SessionRow
 from galley.records.store import queries
-from galley.server.researcher.desk import Desk, number
+from galley.server.researcher.page_context import PageContext, number
 
 AT_ONCE = 1
 
@@ -63,16 +63,16 @@ FILMS = {"gif": "image/gif", "mp4": "video/mp4"}
 class DownloadPages:
     """The files that a researcher can take home."""
 
-    def __init__(self, desk: Desk) -> None:
-        self._desk = desk
+    def __init__(self, context: PageContext) -> None:
+        self._context = context
         self._turns = asyncio.Semaphore(AT_ONCE)
 
     async def download(self, request: Request, session: SessionRow) -> Response:
         """One file, made now from the records as they are."""
         study, kind = request.path_params["study"], request.path_params["kind"]
         download = DOWNLOADS.get(kind)
-        if download is None or study not in await self._desk.read(queries.studies):
-            return self._desk.missing(session, "download; nobody has visited this study yet")
+        if download is None or study not in await self._context.read(queries.studies):
+            return self._context.missing(session, "download; nobody has visited this study yet")
         tests = bool(request.query_params.get("tests"))
         job = {"study": study, "kind": kind, "tests": tests}
         return await self._made(session, job, f"{study}-{_stamp()}.{download.ending}", download.media)
@@ -81,11 +81,11 @@ class DownloadPages:
         """One round as a film, made now."""
         round_id, ending = number(request, "round"), request.path_params["kind"]
         try:
-            row = await self._desk.read(lambda connection: queries.round_row(connection, round_id))
+            row = await self._context.read(lambda connection: queries.round_row(connection, round_id))
         except GalleyError:
-            return self._desk.missing(session, "round")
+            return self._context.missing(session, "round")
         if ending not in FILMS or not can_draw():
-            return self._desk.missing(session, "film: this server makes none")
+            return self._context.missing(session, "film: this server makes none")
         name = f"{row.study}-round-{round_id}.{ending}"
         return await self._made(session, {"round": round_id}, name, FILMS[ending])
 
@@ -94,7 +94,7 @@ class DownloadPages:
         folder = Path(await asyncio.to_thread(tempfile.mkdtemp, prefix="galley-export-"))
         try:
             out = folder / f"out{Path(name).suffix}"
-            job |= {"database": self._desk.database, "out": str(out)}
+            job |= {"database": self._context.database, "out": str(out)}
             async with self._turns:
                 problem = await asyncio.to_thread(_in_a_process, job)
         except BaseException:
@@ -102,7 +102,7 @@ class DownloadPages:
             raise
         if problem:
             await asyncio.to_thread(shutil.rmtree, folder, ignore_errors=True)
-            return self._desk.gate.plain(session, 500, "No file was made", problem)
+            return self._context.logins.plain(session, 500, "No file was made", problem)
         return FileResponse(
             out,
             media_type=media,

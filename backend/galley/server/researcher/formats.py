@@ -1,12 +1,11 @@
-"""How numbers and times are shown on the researcher's pages, and the templates that show them."""
+"""How numbers, times and answers are shown on the researcher's pages."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
-from typing import Any
-
-import jinja2
+from typing import Any, Final
 
 DASH = "–"
 MINUTE_S = 60
@@ -54,21 +53,12 @@ def cell(condition: dict[str, Any]) -> str:
     return ", ".join(f"{factor}: {answer(level)}" for factor, level in condition.items()) or "all"
 
 
-def templates(folder: str) -> jinja2.Environment:
-    """The templates of the frontend for researchers; everything put into them is escaped."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(folder),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {
-        "when": when,
-        "iso": iso,
-        "lasting": lasting,
-        "answer": answer,
-        "words": words,
-        "cell": cell,
-    }
-    return environment
+FILTERS: Final[Mapping[str, Callable[[Any], str]]] = {
+    "when": when,
+    "iso": iso,
+    "lasting": lasting,
+    "answer": answer,
+    "words": words,
+    "cell": cell,
+}
+"""What the templates call them by."""

@@ -15,7 +15,7 @@ from galley.records import Store
 from galley.records.rows import ResearcherRow, SessionRow
 from galley.records.store.researcher_accounts import Researchers
 from galley.server.clock import Clock
-from galley.server.form_reading import FormError, read_form
+from galley.server.form_decoding import FormError, read_form
 from galley.server.headers import same_origin
 from galley.server.researcher.login_throttle import Throttle
 from galley.server.researcher.passwords import LONGEST, LONGEST_NAME, Passwords
@@ -34,11 +34,11 @@ FOREIGN = "This form was sent from another site, so nothing was changed."
 
 Form = Mapping[str, list[str]]
 Page = Callable[[Request, SessionRow], Awaitable[Response]]
-Deed = Callable[[Request, SessionRow, Form], Awaitable[Response]]
+FormAction = Callable[[Request, SessionRow, Form], Awaitable[Response]]
 Endpoint = Callable[[Request], Awaitable[Response]]
 
 
-class Gate:
+class Logins:
     """Lets researchers in and out. Sessions are kept in the records, so they survive a restart."""
 
     def __init__(self, store: Store, environment: jinja2.Environment, clock: Clock) -> None:
@@ -75,7 +75,7 @@ class Gate:
 
         return endpoint
 
-    def deed(self, deed: Deed) -> Endpoint:
+    def form_action(self, form_action: FormAction) -> Endpoint:
         """What a researcher's form does; refused without a session or without that session's token."""
 
         async def endpoint(request: Request) -> Response:
@@ -90,7 +90,7 @@ class Gate:
                 return self.plain(session, error.status, "Not done", f"The form could not be read: {error}.")
             if not _same(first(form, "csrf"), session.csrf):
                 return self.plain(session, 403, "Not done", OLD_FORM)
-            return await deed(request, session, form)
+            return await form_action(request, session, form)
 
         return endpoint
 

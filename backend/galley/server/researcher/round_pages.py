@@ -14,9 +14,9 @@ from galley.records.database.tables import TICKS
 from galley.records.reading import overview
 from galley.records.rows import RoundRow, SessionRow
 from galley.records.store import queries
-from galley.server.researcher.desk import Desk, number
 from galley.server.researcher.downloads import FILMS
 from galley.server.researcher.login import NEVER_CACHED
+from galley.server.researcher.page_context import PageContext, number
 from galley.server.researcher.replay_document import replay_document
 
 
@@ -25,8 +25,8 @@ class RoundPages:
     plays it knows nothing of it.
     """
 
-    def __init__(self, desk: Desk) -> None:
-        self._desk = desk
+    def __init__(self, context: PageContext) -> None:
+        self._context = context
 
     async def round(self, request: Request, session: SessionRow) -> Response:
         """The page that replays a round."""
@@ -38,12 +38,12 @@ class RoundPages:
             return row, [overview.visit(connection, visit) for visit in visits]
 
         try:
-            row, visits = await self._desk.read(read)
+            row, visits = await self._context.read(read)
         except GalleyError:
-            return self._desk.missing(session, "round")
+            return self._context.missing(session, "round")
         live = row.status == "open"
         films = tuple(FILMS) if len(row.joint_actions) and not live and can_draw() else ()
-        return self._desk.show(
+        return self._context.show(
             session, "round.html", row=row, visits=visits, seats=row.seats, live=live, films=films
         )
 
@@ -59,7 +59,7 @@ class RoundPages:
             return orjson.dumps(replay_document(row, ticks, after))
 
         try:
-            document = await self._desk.read(read)
+            document = await self._context.read(read)
         except GalleyError as error:
             return JSONResponse({"error": str(error)}, 404, NEVER_CACHED)
         return Response(document, 200, NEVER_CACHED, "application/json")

@@ -1,4 +1,4 @@
-"""All routes of the researcher's pages in one table, every one of them behind the gate."""
+"""All routes of the researcher's pages in one table, every one of them behind the logins."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from fastapi import APIRouter
 
 from galley.records import Store
 from galley.server.clock import Clock
-from galley.server.researcher.desk import Desk
 from galley.server.researcher.downloads import DownloadPages
-from galley.server.researcher.formats import templates
-from galley.server.researcher.login import HOME, LOGIN, Gate
+from galley.server.researcher.formats import FILTERS
+from galley.server.researcher.login import HOME, LOGIN, Logins
+from galley.server.researcher.page_context import PageContext
 from galley.server.researcher.round_pages import RoundPages
 from galley.server.researcher.study_pages import StudyPages
 from galley.server.researcher.visit_pages import VisitPages
+from galley.server.templates import templates
 from galley.study.study import Study
 
 
@@ -27,16 +28,17 @@ def researcher_pages(
     clock: Clock,
     stop_visit: Callable[[int], Awaitable[None]],
 ) -> APIRouter:
-    """The routes under /researcher. `folder` holds the templates; for the rest see Desk."""
+    """The routes under /researcher. `folder` holds the templates; for the rest see PageContext."""
     environment = templates(folder)
-    gate = Gate(store, environment, clock)
-    desk = Desk(store, database, studies, environment, clock, gate, stop_visit)
-    about_studies, about_visits = StudyPages(desk), VisitPages(desk)
-    about_rounds, files = RoundPages(desk), DownloadPages(desk)
+    environment.filters |= FILTERS
+    logins = Logins(store, environment, clock)
+    context = PageContext(store, database, studies, environment, clock, logins, stop_visit)
+    about_studies, about_visits = StudyPages(context), VisitPages(context)
+    about_rounds, files = RoundPages(context), DownloadPages(context)
 
     router = APIRouter()
-    router.add_route(LOGIN, gate.login_page, methods=["GET"])
-    router.add_route(LOGIN, gate.login, methods=["POST"])
+    router.add_route(LOGIN, logins.login_page, methods=["GET"])
+    router.add_route(LOGIN, logins.login, methods=["POST"])
     pages = {
         "": about_studies.home,
         "/studies/{study}": about_studies.study,
@@ -52,8 +54,8 @@ def researcher_pages(
         "/studies/{study}/live.json": about_studies.study_live,
         "/rounds/{round:int}/replay.json": about_rounds.replay,
     }
-    deeds = {
-        "/logout": gate.logout,
+    form_actions = {
+        "/logout": logins.logout,
         "/studies/{study}/state": about_studies.set_state,
         "/studies/{study}/test-links": about_studies.make_test_link,
         "/studies/{study}/test-links/withdraw": about_studies.withdraw_test_link,
@@ -61,9 +63,9 @@ def researcher_pages(
         "/visits/{visit:int}/erase": about_visits.erase,
     }
     for path, page in pages.items():
-        router.add_route(f"{HOME}{path}", gate.page(page), methods=["GET"])
+        router.add_route(f"{HOME}{path}", logins.page(page), methods=["GET"])
     for path, page in data.items():
-        router.add_route(f"{HOME}{path}", gate.data(page), methods=["GET"])
-    for path, deed in deeds.items():
-        router.add_route(f"{HOME}{path}", gate.deed(deed), methods=["POST"])
+        router.add_route(f"{HOME}{path}", logins.data(page), methods=["GET"])
+    for path, form_action in form_actions.items():
+        router.add_route(f"{HOME}{path}", logins.form_action(form_action), methods=["POST"])
     return router

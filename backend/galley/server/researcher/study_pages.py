@@ -13,10 +13,10 @@ from galley.records.reading import overview
 from galley.records.rows import SessionRow
 from galley.records.store.links_for_tests import LinksForTests
 from galley.server.participant.visits import TEST_PARAM
-from galley.server.researcher.desk import Desk, link
+from galley.server.researcher.counts import DAY_MS, arrivals, cell_rows, flag_counts, study_rows
 from galley.server.researcher.downloads import DOWNLOADS
 from galley.server.researcher.login import HOME, NEVER_CACHED, Form, first
-from galley.server.researcher.tallies import DAY_MS, arrivals, cell_rows, flag_tallies, study_rows
+from galley.server.researcher.page_context import PageContext, link
 from galley.study.study import Study
 from galley.study.visit.condition_slots import capacity, cells
 
@@ -28,22 +28,22 @@ TEST_LINK_DAYS = 7
 class StudyPages:
     """All studies, one study, its visits and its rounds."""
 
-    def __init__(self, desk: Desk) -> None:
-        self._desk = desk
+    def __init__(self, context: PageContext) -> None:
+        self._context = context
 
     # ---- all studies ---------------------------------------------------------------------------------------
 
     async def home(self, request: Request, session: SessionRow) -> Response:
         """Every study with its live state."""
-        return self._desk.show(session, "studies.html", rows=await self._rows())
+        return self._context.show(session, "studies.html", rows=await self._rows())
 
     async def home_live(self, request: Request, session: SessionRow) -> Response:
         """The numbers of that page, as they are now."""
-        html = self._desk.part(session, "_studies.html", rows=await self._rows())
+        html = self._context.part(session, "_studies.html", rows=await self._rows())
         return JSONResponse({"parts": {"studies": html}}, 200, NEVER_CACHED)
 
     async def _rows(self) -> list[dict[str, Any]]:
-        return study_rows(await self._desk.read(overview.studies), self._desk.studies)
+        return study_rows(await self._context.read(overview.studies), self._context.studies)
 
     # ---- one study -----------------------------------------------------------------------------------------
 
@@ -52,8 +52,8 @@ class StudyPages:
         name = request.path_params["study"]
         state = await self._state(name)
         if state is None:
-            return self._desk.missing(session, "study")
-        study = self._desk.studies.get(name)
+            return self._context.missing(session, "study")
+        study = self._context.studies.get(name)
         links = [] if study is None else [("Link for participants", f"{request.base_url}s/{name}")]
         kept = () if study is None else study.config.recruitment.keep
         if kept:
@@ -62,7 +62,7 @@ class StudyPages:
         title = name if study is None else study.title
         tests = () if study is None else await self._test_links(request, study)
         design = () if study is None else cells(study.config)
-        return self._desk.show(
+        return self._context.show(
             session,
             "study.html",
             name=name,
@@ -77,7 +77,7 @@ class StudyPages:
     async def _test_links(self, request: Request, study: Study) -> list[dict[str, Any]]:
         """The study's test links, newest first, as the page shows them."""
         found = await asyncio.wrap_future(
-            LinksForTests(self._desk.store).of_study(study.name, self._desk.clock.ms())
+            LinksForTests(self._context.store).of_study(study.name, self._context.clock.ms())
         )
         design = cells(study.config)
         return [
@@ -94,16 +94,16 @@ class StudyPages:
     async def make_test_link(self, request: Request, session: SessionRow, form: Form) -> Response:
         """A new test link, for one cell of the design or for any."""
         name = request.path_params["study"]
-        study = self._desk.studies.get(name)
+        study = self._context.studies.get(name)
         if study is None:
-            return self._desk.missing(session, "study")
-        chosen, now_ms = first(form, "cell"), self._desk.clock.ms()
+            return self._context.missing(session, "study")
+        chosen, now_ms = first(form, "cell"), self._context.clock.ms()
         count = len(cells(study.config))
         known = {str(number): number for number in range(count)} | {"": None}
         if chosen not in known:
             told = f"The design has {count} cells, and this is none of them."
-            return self._desk.gate.plain(session, 400, "Not done", told)
-        links = LinksForTests(self._desk.store)
+            return self._context.logins.plain(session, 400, "Not done", told)
+        links = LinksForTests(self._context.store)
         author = session.researcher.name
         await asyncio.wrap_future(
             links.make(name, known[chosen], author, now_ms, now_ms + TEST_LINK_DAYS * DAY_MS)
@@ -113,9 +113,9 @@ class StudyPages:
     async def withdraw_test_link(self, request: Request, session: SessionRow, form: Form) -> Response:
         """Let a test link be good for nothing any more; visits begun with it go on."""
         name = request.path_params["study"]
-        links = LinksForTests(self._desk.store)
+        links = LinksForTests(self._context.store)
         if not await asyncio.wrap_future(links.withdraw(name, first(form, "link"))):
-            return self._desk.missing(session, "test link")
+            return self._context.missing(session, "test link")
         return RedirectResponse(f"{HOME}/studies/{name}#tests", 303, NEVER_CACHED)
 
     async def study_live(self, request: Request, session: SessionRow) -> Response:
@@ -125,7 +125,7 @@ class StudyPages:
         if state is None:
             return JSONResponse({"error": "no such study"}, 404, NEVER_CACHED)
         parts = {
-            part: self._desk.part(session, f"_{part}.html", name=name, **state)
+            part: self._context.part(session, f"_{part}.html", name=name, **state)
             for part in ("numbers", "stages", "cells", "rounds", "flags", "arrivals", "arrivals_table")
         }
         return JSONResponse({"parts": parts}, 200, NEVER_CACHED)
@@ -139,15 +139,15 @@ class StudyPages:
                 "stages": overview.stages(connection, name) if here else (),
                 "cells": overview.cells(connection, name) if here else (),
                 "rounds": overview.current_rounds(connection, name) if here else (),
-                "flags": flag_tallies(overview.flags(connection, name, tests=False) if here else {}),
+                "flags": flag_counts(overview.flags(connection, name, tests=False) if here else {}),
                 "arrivals": arrivals(overview.began(connection, name)),
             }
 
-        state = await self._desk.read(read)
+        state = await self._context.read(read)
         row = next(
-            (row for row in study_rows(state.pop("rows"), self._desk.studies) if row["name"] == name), None
+            (row for row in study_rows(state.pop("rows"), self._context.studies) if row["name"] == name), None
         )
-        study = self._desk.studies.get(name)
+        study = self._context.studies.get(name)
         room = None if study is None else capacity(study)
         if row is None:
             return None
@@ -156,12 +156,12 @@ class StudyPages:
     async def set_state(self, request: Request, session: SessionRow, form: Form) -> Response:
         """Open, pause or close a study; visits that are under way go on."""
         name, state = request.path_params["study"], first(form, "state")
-        known = name in self._desk.studies or any(row["name"] == name for row in await self._rows())
+        known = name in self._context.studies or any(row["name"] == name for row in await self._rows())
         if not known:
-            return self._desk.missing(session, "study")
+            return self._context.missing(session, "study")
         if state not in STUDY_STATES:
-            return self._desk.gate.plain(session, 400, "Not done", "A study is open, paused or closed.")
-        await asyncio.wrap_future(self._desk.store.set_study_state(name, state, self._desk.clock.ms()))
+            return self._context.logins.plain(session, 400, "Not done", "A study is open, paused or closed.")
+        await asyncio.wrap_future(self._context.store.set_study_state(name, state, self._context.clock.ms()))
         return RedirectResponse(f"{HOME}/studies/{name}", 303, NEVER_CACHED)
 
     # ---- its visits and rounds -----------------------------------------------------------------------------
@@ -184,10 +184,10 @@ class StudyPages:
                 offset=page * VISITS_A_PAGE,
             )
 
-        found = await self._desk.read(read)
+        found = await self._context.read(read)
         here = f"{HOME}/studies/{name}/visits"
         chosen = {"status": status, "flagged": int(flagged), "tests": int(tests)}
-        return self._desk.show(
+        return self._context.show(
             session,
             "visits.html",
             name=name,
@@ -201,13 +201,13 @@ class StudyPages:
     async def rounds(self, request: Request, session: SessionRow) -> Response:
         """The rounds of a study, newest first."""
         name, page = request.path_params["study"], _page(request.query_params.get("page"))
-        found = await self._desk.read(
+        found = await self._context.read(
             lambda connection: overview.rounds(
                 connection, name, limit=ROUNDS_A_PAGE + 1, offset=page * ROUNDS_A_PAGE
             )
         )
         here = f"{HOME}/studies/{name}/rounds"
-        return self._desk.show(
+        return self._context.show(
             session,
             "rounds.html",
             name=name,

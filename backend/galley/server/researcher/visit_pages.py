@@ -12,8 +12,8 @@ from galley.errors import GalleyError
 from galley.records.reading import overview
 from galley.records.rows import SessionRow
 from galley.records.store.erase import erase_participant
-from galley.server.researcher.desk import Desk, number
 from galley.server.researcher.login import HOME, NEVER_CACHED, Form, first
+from galley.server.researcher.page_context import PageContext, number
 
 LONGEST_NOTE = 4000
 MOST_ROUNDS = 1000
@@ -22,8 +22,8 @@ MOST_ROUNDS = 1000
 class VisitPages:
     """One visit by its number."""
 
-    def __init__(self, desk: Desk) -> None:
-        self._desk = desk
+    def __init__(self, context: PageContext) -> None:
+        self._context = context
 
     async def visit(self, request: Request, session: SessionRow) -> Response:
         """Timeline, answers, rounds, flags and notes of a visit."""
@@ -33,12 +33,12 @@ class VisitPages:
         """Add a note, signed with the researcher's name."""
         visit_id, text = number(request, "visit"), first(form, "text").replace("\0", "").strip()
         if await self._found(visit_id) is None:
-            return self._desk.missing(session, "visit")
+            return self._context.missing(session, "visit")
         if not text or len(text) > LONGEST_NOTE:
             problem = f"A note has 1 to {LONGEST_NOTE} characters; this one has {len(text)}."
             return await self._page(visit_id, session, 422, note=text, note_problem=problem)
-        store, author = self._desk.store, session.researcher.name
-        await asyncio.wrap_future(store.add_note(visit_id, author, text, self._desk.clock.ms()))
+        store, author = self._context.store, session.researcher.name
+        await asyncio.wrap_future(store.add_note(visit_id, author, text, self._context.clock.ms()))
         return RedirectResponse(f"{HOME}/visits/{visit_id}#notes", 303, NEVER_CACHED)
 
     async def erase(self, request: Request, session: SessionRow, form: Form) -> Response:
@@ -46,23 +46,23 @@ class VisitPages:
         visit_id = number(request, "visit")
         found = await self._found(visit_id)
         if found is None:
-            return self._desk.missing(session, "visit")
+            return self._context.missing(session, "visit")
         if first(form, "confirm").strip() != found.participant:
             problem = f"Nothing was erased. To erase this participant, type {found.participant} exactly."
             return await self._page(visit_id, session, 422, erase_problem=problem)
-        store, now_ms = self._desk.store, self._desk.clock.ms()
+        store, now_ms = self._context.store, self._context.clock.ms()
         # A visit that is over cannot take up its round again between the match's end and the erasing.
         await asyncio.wrap_future(store.end_visit(visit_id, "expired", now_ms))
-        await self._desk.stop_visit(visit_id)
+        await self._context.stop_visit(visit_id)
         try:
             erased = await asyncio.to_thread(erase_participant, store, found.participant)
         except GalleyError as error:
-            return self._desk.gate.plain(session, 409, "Not erased", f"{error}.")
+            return self._context.logins.plain(session, 409, "Not erased", f"{error}.")
         told = f"{found.participant} was erased for good: visits {erased.visits}, rounds {erased.rounds}."
-        return self._desk.gate.plain(session, 200, "Erased", told)
+        return self._context.logins.plain(session, 200, "Erased", told)
 
     async def _found(self, visit_id: int) -> Any:
-        return await self._desk.read(lambda connection: overview.visit(connection, visit_id))
+        return await self._context.read(lambda connection: overview.visit(connection, visit_id))
 
     async def _page(
         self,
@@ -88,10 +88,10 @@ class VisitPages:
                 "notes": overview.notes(connection, visit_id),
             }
 
-        values = await self._desk.read(read)
+        values = await self._context.read(read)
         if values is None:
-            return self._desk.missing(session, "visit")
-        return self._desk.show(
+            return self._context.missing(session, "visit")
+        return self._context.show(
             session,
             "visit.html",
             status,

@@ -80,7 +80,7 @@ def cell_rows(found: Iterable[Any], study: Study | None) -> list[dict[str, Any]]
     return rows
 
 
-def flag_tallies(flags: Mapping[int, Iterable[Any]]) -> list[dict[str, Any]]:
+def flag_counts(flags: Mapping[int, Iterable[Any]]) -> list[dict[str, Any]]:
     """One row per kind of flag with how many visits have it, most first; `flags` are Flags by visit."""
     kinds: dict[str, int] = {}
     for of_visit in flags.values():

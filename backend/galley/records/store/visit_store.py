@@ -2,25 +2,17 @@
 
 from __future__ import annotations
 
-import base64
-import secrets
 from collections.abc import Mapping
 from concurrent.futures import Future
 from typing import Any
 
 from galley.records.database.tables import STUDY_STATES, VISIT_STATUSES
 from galley.records.rows import Arrival, Begun, VisitRow
-from galley.records.store import absences, arrivals, queries
-from galley.records.store import visit_writes as jobs
+from galley.records.store import absences, arrivals, queries, visit_writes
 from galley.records.store.arrivals import Allocate, Plan
 from galley.records.store.store_base import StoreBase
+from galley.records.store.visit_ids import link_secret, participant_name
 from galley.study.written.questionnaire import Questionnaire
-
-
-def _names() -> dict[str, str]:
-    """A token that cannot be guessed, and a name for exports that has nothing to do with it."""
-    participant = "p" + base64.b32encode(secrets.token_bytes(10)).decode().lower()
-    return {"token": secrets.token_urlsafe(24), "participant": participant}
 
 
 class VisitStore(StoreBase):
@@ -33,12 +25,12 @@ class VisitStore(StoreBase):
         slots, whose last visit expires if it was not over; `plan(visit_no, slot)` says what it will meet.
         Both are called in the writer's thread. Without `allocate`, and for tests, no slot is taken.
         """
-        names = _names()
+        names = {"token": link_secret(), "participant": participant_name()}
         return self.write(lambda connection: arrivals.begin(connection, arrival, names, plan, allocate))
 
     def next_visit_no(self, study: str) -> Future[int]:
         """A visit number of `study` that was never given out before, from 0."""
-        return self.write(lambda connection: jobs.next_visit_no(connection, study))
+        return self.write(lambda connection: visit_writes.next_visit_no(connection, study))
 
     def create_visit(
         self,
@@ -53,7 +45,8 @@ class VisitStore(StoreBase):
     ) -> Future[VisitRow]:
         """A new visit at its first step, outside every slot."""
         values = {
-            **_names(),
+            "token": link_secret(),
+            "participant": participant_name(),
             "study": study,
             "study_sha256": study_sha256,
             "seed": str(seed),
@@ -63,7 +56,7 @@ class VisitStore(StoreBase):
             "link_params": dict(link_params),
             "created_ms": round(at_ms),
         }
-        return self.write(lambda connection: jobs.create_visit(connection, values))
+        return self.write(lambda connection: visit_writes.create_visit(connection, values))
 
     def visit(self, token: str) -> Future[VisitRow | None]:
         """The visit behind a link, None if there is none."""
@@ -75,7 +68,9 @@ class VisitStore(StoreBase):
 
     def enter_step(self, visit_id: int, step_id: str, at_ms: float) -> Future[None]:
         """Note that a step's page was sent; the first time counts as entering it."""
-        return self.write(lambda connection: jobs.enter_step(connection, visit_id, step_id, round(at_ms)))
+        return self.write(
+            lambda connection: visit_writes.enter_step(connection, visit_id, step_id, round(at_ms))
+        )
 
     def save_answers(
         self,
@@ -108,10 +103,10 @@ class VisitStore(StoreBase):
             for position, (item, value) in enumerate(answers.items(), 1)
         ]
         code = completion_code
-        left = jobs.Left(
+        left = visit_writes.LeftStep(
             visit_id, step_id, rows, new_step_index, _status(status), round(at_ms), code, consent_sha256
         )
-        return self.write(lambda connection: jobs.leave_step(connection, left))
+        return self.write(lambda connection: visit_writes.leave_step(connection, left))
 
     def save_attempt(
         self,
@@ -132,7 +127,7 @@ class VisitStore(StoreBase):
             "wrong": wrong,
             "at_ms": round(at_ms),
         }
-        return self.write(lambda connection: jobs.save_attempt(connection, visit_id, values))
+        return self.write(lambda connection: visit_writes.save_attempt(connection, visit_id, values))
 
     def end_visit(
         self, visit_id: int, status: str, at_ms: float, completion_code: str | None = None
@@ -140,12 +135,14 @@ class VisitStore(StoreBase):
         """End a visit at the step where it is; False if it was over."""
         _status(status)
         return self.write(
-            lambda connection: jobs.end_visit(connection, visit_id, status, round(at_ms), completion_code)
+            lambda connection: visit_writes.end_visit(
+                connection, visit_id, status, round(at_ms), completion_code
+            )
         )
 
     def seen(self, visit_id: int, at_ms: float) -> Future[None]:
         """Note a sign of life; pages, answers, keys and pings count by themselves."""
-        return self.write(lambda connection: jobs.seen(connection, visit_id, round(at_ms)))
+        return self.write(lambda connection: visit_writes.seen(connection, visit_id, round(at_ms)))
 
     def hidden(
         self, visit_id: int, step_id: str, started_ms: float, ended_ms: float | None = None
@@ -153,7 +150,7 @@ class VisitStore(StoreBase):
         """Note that a participant's page was hidden; once more with `ended_ms` when it is shown again."""
         end = None if ended_ms is None else round(ended_ms)
         return self.write(
-            lambda connection: jobs.hidden(connection, visit_id, step_id, round(started_ms), end)
+            lambda connection: visit_writes.hidden(connection, visit_id, step_id, round(started_ms), end)
         )
 
     def left_page(self, visit_id: int, step_id: str, at_ms: float) -> Future[None]:
@@ -166,7 +163,9 @@ class VisitStore(StoreBase):
 
     def add_note(self, visit_id: int, author: str, text: str, at_ms: float) -> Future[int]:
         """The id of a researcher's new note about a visit."""
-        return self.write(lambda connection: jobs.add_note(connection, visit_id, author, text, round(at_ms)))
+        return self.write(
+            lambda connection: visit_writes.add_note(connection, visit_id, author, text, round(at_ms))
+        )
 
     def study_state(self, study: str) -> Future[str]:
         """Whether a study takes new visits: open, paused or closed."""
@@ -179,7 +178,9 @@ class VisitStore(StoreBase):
         """
         if state not in STUDY_STATES:
             raise ValueError(f"no state of a study: {state!r}; use one of {STUDY_STATES}")
-        return self.write(lambda connection: jobs.set_study_state(connection, study, state, round(at_ms)))
+        return self.write(
+            lambda connection: visit_writes.set_study_state(connection, study, state, round(at_ms))
+        )
 
 
 def _status(status: str) -> str:

@@ -13,9 +13,7 @@ from galley.records.database.journal_rows import Journal
 from galley.records.database.leases import Lease
 from galley.records.reading.round_replay import trajectories_of
 from galley.records.rows import ClockRow, KeyRow, NewRound, PauseRow, RoundRow, SeatRow, TickRow
-from galley.records.store import pairing as lobby
-from galley.records.store import queries
-from galley.records.store import round_writes as round_jobs
+from galley.records.store import pairing, queries, round_writes
 from galley.records.store.pairing import Together, Waits
 from galley.records.store.store_base import StoreBase
 
@@ -28,7 +26,7 @@ class RoundStore(StoreBase):
 
         Fails with GalleyError if one of them plays another round at that step.
         """
-        return self.write(lambda connection: round_jobs.set_up(connection, new))
+        return self.write(lambda connection: round_writes.set_up(connection, new))
 
     def create_round(
         self,
@@ -67,11 +65,11 @@ class RoundStore(StoreBase):
         Who asked last `gone_s` seconds ago does not wait any more. `together` says what round two visits
         play; it is called in the writer's thread. Servers take turns, so nobody is paired twice.
         """
-        return self.write(lambda connection: lobby.wait(connection, waits, gone_s, together))
+        return self.write(lambda connection: pairing.wait(connection, waits, gone_s, together))
 
     def stop_waiting(self, visit_id: int, step_id: str) -> Future[int | None]:
         """None once nobody can be paired with the visit at this step; its round if it was paired before."""
-        return self.write(lambda connection: lobby.stop(connection, visit_id, step_id))
+        return self.write(lambda connection: pairing.stop(connection, visit_id, step_id))
 
     def lease_round(
         self, round_id: int, owner: str, ttl_s: float, steal: bool = False, address: str | None = None
@@ -135,7 +133,7 @@ class RoundStore(StoreBase):
             "agent_sha256": agent_sha256,
             "at_ms": round(at_ms),
         }
-        return self.write(lambda connection: round_jobs.stand_in(connection, round_id, values, lease))
+        return self.write(lambda connection: round_writes.stand_in(connection, round_id, values, lease))
 
     def finish_round(
         self,
@@ -154,7 +152,7 @@ class RoundStore(StoreBase):
 
         def work(connection: Connection) -> bool:
             end = (status, score, deliveries, round(ended_at_ms), final_state)
-            closed = round_jobs.finish(connection, round_id, *end, lease)
+            closed = round_writes.finish(connection, round_id, *end, lease)
             self._writer.forget(round_id)
             return closed
 

@@ -22,7 +22,7 @@ class Attempt:
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class VisitState:
     """A visit with its answers by step and item, when each step was entered (ms), its last failed attempt."""
 
     visit: VisitRow
@@ -31,7 +31,7 @@ class Standing:
     attempt: Attempt | None
 
 
-def standing(connection: Connection, token: str) -> Standing | None:
+def visit_state(connection: Connection, token: str) -> VisitState | None:
     """Where the visit with this token stands; None if there is none."""
     visit = queries.visit(connection, token)
     if visit is None:
@@ -49,4 +49,4 @@ def standing(connection: Connection, token: str) -> Standing | None:
         .one_or_none()
     )
     attempt = None if last is None else Attempt(**last)
-    return Standing(visit, queries.answers(connection, visit.id), entered, attempt)
+    return VisitState(visit, queries.answers(connection, visit.id), entered, attempt)

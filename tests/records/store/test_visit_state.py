@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from galley.records import Store
-from galley.records.store.visit_standing import Attempt, Standing, standing
+from galley.records.store.visit_state import Attempt, VisitState, visit_state
 from tests.records.helpers import START_MS, begin
 
 
-def read(store: Store, token: str) -> Standing | None:
-    return store.read(lambda connection: standing(connection, token)).result()
+def read(store: Store, token: str) -> VisitState | None:
+    return store.read(lambda connection: visit_state(connection, token)).result()
 
 
 def test_a_visit_stands_where_its_answers_and_attempts_put_it(store: Store) -> None:

@@ -15,7 +15,7 @@ from fastapi.responses import HTMLResponse, Response
 from galley.records import Store
 from galley.records.rows import SessionRow
 from galley.server.clock import Clock
-from galley.server.researcher.login import NEVER_CACHED, Gate
+from galley.server.researcher.login import NEVER_CACHED, Logins
 from galley.study.study import Study
 
 T = TypeVar("T")
@@ -23,7 +23,7 @@ MOST_ID = 2**63 - 1
 
 
 @dataclass(frozen=True, slots=True)
-class Desk:
+class PageContext:
     """Handed to every group of pages. `database` is the URL that an export opens in a process of its own;
     `stop_visit` ends the live match of a visit, if there is one, without writing its end.
     """
@@ -33,7 +33,7 @@ class Desk:
     studies: Mapping[str, Study]
     environment: jinja2.Environment
     clock: Clock
-    gate: Gate
+    logins: Logins
     stop_visit: Callable[[int], Awaitable[None]]
 
     async def read(self, query: Callable[[Any], T]) -> T:
@@ -51,7 +51,7 @@ class Desk:
 
     def missing(self, session: SessionRow, what: str) -> Response:
         """The page for something that is not there (any more)."""
-        return self.gate.plain(session, 404, "Not found", f"There is no such {what}, or it was erased.")
+        return self.logins.plain(session, 404, "Not found", f"There is no such {what}, or it was erased.")
 
 
 def number(request: Request, name: str) -> int:
