@@ -11,6 +11,7 @@ import pytest
 from galley.records import Store
 from galley.records.store.researcher_accounts import Researchers
 from galley.server.app import create_app
+from galley.server.content import load_content
 from galley.server.researcher.passwords import Passwords
 from galley.server.settings import Settings
 from tests.security.hostile import hostile_workspace
@@ -59,7 +60,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     folder = tmp_path_factory.mktemp("site")
     workspace = hostile_workspace(folder / "lab")
     with Store.open(f"sqlite:///{folder}/routes.sqlite") as store:
-        routes = list(all_routes(list(create_app(workspace, store, Settings()).routes)))
+        routes = list(all_routes(list(create_app(load_content(workspace), store, Settings()).routes)))
     with serving(workspace, folder / "records.sqlite", messages_per_s=1_000_000) as up:
         Researchers(up.store).put(NAME, Passwords().hashed(PASSWORD), 1e12).result()
         yield Site(up, routes)

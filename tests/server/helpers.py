@@ -20,6 +20,7 @@ from websockets.sync.client import ClientConnection, connect
 
 from galley.records import Store
 from galley.server.app import create_app
+from galley.server.content import load_content
 from galley.server.run import listen, server_config
 from galley.server.settings import Settings
 from galley.study.written.questionnaire import Questionnaire
@@ -84,7 +85,7 @@ def serving(
     """A server for a workspace on a free port, until the block ends."""
     chosen = Settings(port=0, **settings)
     with Store.open(database, serving=True) as store:
-        app = create_app(workspace, store, chosen, preview=preview)
+        app = create_app(load_content(workspace, chosen.study), store, chosen, preview=preview)
         listening = listen(chosen)
         server = uvicorn.Server(server_config(app, chosen))
         thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]})

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator, Iterator, Mapping
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from typing import Any
 
 from fastapi import FastAPI, Request
 from fastapi.responses import Response
@@ -14,14 +13,10 @@ from starlette.exceptions import HTTPException
 from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
-from galley.agents.catalogue import Catalogue
-from galley.agents.episode import play_episode
-from galley.agents.scripted import Stay
 from galley.errors import GalleyError
-from galley.kitchen import Layout, warm
-from galley.kitchen.layout_file import load_layouts
 from galley.records import Store
 from galley.server.clock import Clock
+from galley.server.content import Content
 from galley.server.garbage_collection import collect_between_rounds, few_collections
 from galley.server.headers import HEADERS, SecureHeaders
 from galley.server.participant.pages import NO_PAGE, NOT_FOUND, Pages
@@ -31,22 +26,14 @@ from galley.server.researcher.routes import researcher_pages
 from galley.server.rounds.lobby import Lobby
 from galley.server.rounds.matches import Matches
 from galley.server.rounds.play_socket import Play
-from galley.server.rounds.set_up import round_layout
 from galley.server.rounds.thinking import Thinking
 from galley.server.settings import Settings
 from galley.server.templates import translated_templates
-from galley.study.study import Study, load_study
-from galley.study.visit.condition_slots import cells
-from galley.study.visit.plan import plan_visit, visit_seed
 from galley.translations import Catalogues, mark
-from galley.workspace import Workspace, frontend_folder
+from galley.workspace import frontend_folder
 
 LOG = logging.getLogger(__name__)
 STATIC_KEPT_S = 300
-REHEARSED_TICKS = 3
-REHEARSED_VISITS = 64
-REHEARSED_PER_CELL = 8
-NO_AGENTS = (None, "exit", "go_on", "end_round")
 
 WRONG = mark("Something went wrong")
 NOT_POSSIBLE = mark("Not possible")
@@ -57,25 +44,14 @@ BROKEN = mark(
 AWAY_RETRY_S = "5"
 
 
-def create_app(workspace: Workspace, store: Store, settings: Settings, *, preview: bool = False) -> FastAPI:
-    """The application that serves a workspace's studies (or the one that the settings name) into a store.
-
-    With `preview` every visit is a test. Kernels are compiled and every agent that a study needs is tried
-    here, so that nothing is left to the first round.
-
-    Raises: GalleyError or InvalidFiles when a study or an agent it needs cannot be used.
-    """
-    studies = _studies(workspace, settings.study)
-    layouts = load_layouts(workspace)
-    catalogue = Catalogue(workspace)
-    warm()
-    _rehearse(studies, layouts, catalogue)
-
+def create_app(content: Content, store: Store, settings: Settings, *, preview: bool = False) -> FastAPI:
+    """The application that serves studies and keeps what happens in a store; with `preview` all are tests."""
+    studies = content.studies
     clock = Clock()
     thinking = Thinking(settings.think_window_ms / 1000.0)
     catalogues = Catalogues.load()
     visits = Visits(store, studies, clock, catalogues, preview=preview)
-    matches = Matches(store, visits, catalogue, layouts, thinking, clock, settings.reached_at)
+    matches = Matches(store, visits, content.agents, content.layouts, thinking, clock, settings.reached_at)
     frontend = frontend_folder()
     environment = translated_templates(str(frontend / "templates"), catalogues)
     pages = Pages(
@@ -112,7 +88,6 @@ def create_app(workspace: Workspace, store: Store, settings: Settings, *, previe
     app.include_router(
         researcher_pages(
             store=store,
-            database=settings.database or workspace.database,
             studies=studies,
             folder=str(frontend / "templates"),
             clock=clock,
@@ -155,54 +130,3 @@ class Static(StaticFiles):
         response = await super().get_response(path, scope)
         response.headers["cache-control"] = f"public, max-age={STATIC_KEPT_S}"
         return response
-
-
-def _studies(workspace: Workspace, only: str) -> Mapping[str, Study]:
-    names = (only,) if only else workspace.names("studies")
-    if not names:
-        raise GalleyError(
-            f"{workspace.path / 'studies'}: there is no study to serve; write one, see docs/first-study.md"
-        )
-    return {name: load_study(workspace, name) for name in names}
-
-
-def _rehearse(studies: Mapping[str, Study], layouts: Mapping[str, Layout], catalogue: Catalogue) -> None:
-    """Let every agent act on every layout that a visit can bring it to, from both seats.
-
-    Raises: GalleyError naming agent and layout when one cannot.
-    """
-    met = {
-        (name, round_layout(layouts, data))
-        for study in studies.values()
-        for data in _rounds(study)
-        for name in _agents_of(data)
-    }
-    for name, layout in sorted(met, key=lambda pair: (pair[0], pair[1].name)):
-        bundle = catalogue.bundle(name)
-        try:
-            for seat in (0, 1):
-                agent = bundle.make()
-                agents = (agent, Stay()) if seat == 0 else (Stay(), agent)
-                play_episode(layout, agents, seed=0, ticks=REHEARSED_TICKS)
-        except GalleyError:
-            raise
-        except Exception as error:
-            raise GalleyError(
-                f"agents/{name}: it cannot play on layout {layout.name} ({type(error).__name__}: {error}); "
-                "run `galley agents check`"
-            ) from error
-
-
-def _rounds(study: Study) -> Iterator[Mapping[str, Any]]:
-    """The settings of the rounds that visits meet: of some visits in each cell of the design."""
-    for number in range(min(REHEARSED_VISITS, REHEARSED_PER_CELL * len(cells(study.config)))):
-        for step in plan_visit(study, visit_seed(study, number), number).steps:
-            if step.kind == "round":
-                yield step.data
-
-
-def _agents_of(data: Mapping[str, Any]) -> set[str]:
-    """Every agent that may play a round, those that stand in for a person included."""
-    lobby = data.get("lobby", {})
-    names = {data["agent"], lobby.get("fallback"), lobby.get("dropout")}
-    return {name for name in names if name not in NO_AGENTS}

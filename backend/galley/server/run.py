@@ -18,6 +18,7 @@ from fastapi import FastAPI
 from galley.errors import GalleyError
 from galley.records import Store
 from galley.server.app import create_app
+from galley.server.content import load_content
 from galley.server.settings import Settings, read_settings
 from galley.workspace import Workspace
 
@@ -77,7 +78,7 @@ def _serve(workspace: Workspace, settings: Settings, database: str, *, preview: 
             known = replace(
                 settings, reached_at=settings.reached_at or reached_at(listening, store.engine.url)
             )
-            app = create_app(workspace, store, known, preview=preview)
+            app = create_app(load_content(workspace, known.study), store, known, preview=preview)
             # A thread that wants the interpreter gets it sooner: a tick waits less for an agent that thinks
             # in Python.
             sys.setswitchinterval(SWITCH_INTERVAL_S)

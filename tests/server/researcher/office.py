@@ -130,7 +130,6 @@ def open_office(database: Path, workspace: Workspace, study: Study, visits: bool
         app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
         pages = researcher_pages(
             store=store,
-            database=str(database),
             studies={study.name: study},
             folder=str(frontend_folder() / "templates"),
             clock=clock,

@@ -46,6 +46,11 @@ class StoreBase:
         """For work that no transaction can hold, such as rewriting the file."""
         return self._engine
 
+    @property
+    def url(self) -> str:
+        """The URL that opens the same database, its password included: never to be shown."""
+        return self._engine.url.render_as_string(hide_password=False)
+
     def write(
         self, work: Callable[[Connection], T], *, first: int | Literal["all"] | None = None
     ) -> Future[T]:

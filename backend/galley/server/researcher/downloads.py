@@ -94,7 +94,7 @@ class DownloadPages:
         folder = Path(await asyncio.to_thread(tempfile.mkdtemp, prefix="galley-export-"))
         try:
             out = folder / f"out{Path(name).suffix}"
-            job |= {"database": self._context.database, "out": str(out)}
+            job |= {"database": self._context.store.url, "out": str(out)}
             async with self._turns:
                 problem = await asyncio.to_thread(_in_a_process, job)
         except BaseException:

@@ -24,12 +24,12 @@ MOST_ID = 2**63 - 1
 
 @dataclass(frozen=True, slots=True)
 class PageContext:
-    """Handed to every group of pages. `database` is the URL that an export opens in a process of its own;
+    """Handed to every group of pages.
+
     `stop_visit` ends the live match of a visit, if there is one, without writing its end.
     """
 
     store: Store
-    database: str
     studies: Mapping[str, Study]
     environment: jinja2.Environment
     clock: Clock

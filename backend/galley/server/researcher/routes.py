@@ -22,7 +22,6 @@ from galley.study.study import Study
 def researcher_pages(
     *,
     store: Store,
-    database: str,
     studies: Mapping[str, Study],
     folder: str,
     clock: Clock,
@@ -32,7 +31,7 @@ def researcher_pages(
     environment = templates(folder)
     environment.filters |= FILTERS
     logins = Logins(store, environment, clock)
-    context = PageContext(store, database, studies, environment, clock, logins, stop_visit)
+    context = PageContext(store, studies, environment, clock, logins, stop_visit)
     about_studies, about_visits = StudyPages(context), VisitPages(context)
     about_rounds, files = RoundPages(context), DownloadPages(context)
 

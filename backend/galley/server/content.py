@@ -1,0 +1,100 @@
+"""What a server has to offer: studies, with the kitchens and agents that they name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from galley.agents.catalogue import Catalogue
+from galley.agents.episode import play_episode
+from galley.agents.scripted import Stay
+from galley.errors import GalleyError
+from galley.kitchen import Layout, warm
+from galley.kitchen.layout_file import load_layouts
+from galley.server.rounds.set_up import round_layout
+from galley.study.study import Study, load_study
+from galley.study.visit.condition_slots import cells
+from galley.study.visit.plan import plan_visit, visit_seed
+from galley.workspace import Workspace
+
+REHEARSED_TICKS = 3
+REHEARSED_VISITS = 64
+REHEARSED_PER_CELL = 8
+NO_AGENTS = (None, "exit", "go_on", "end_round")
+
+
+@dataclass(frozen=True, slots=True)
+class Content:
+    """Studies by name, layouts by name and alias, and the agents that may be met in them."""
+
+    studies: Mapping[str, Study]
+    layouts: Mapping[str, Layout]
+    agents: Catalogue
+
+
+def load_content(workspace: Workspace, only: str = "") -> Content:
+    """All studies of a workspace, or `only` one, ready to be served.
+
+    Kernels are compiled and every agent that a study needs is tried here, so that nothing is left to the
+    first round.
+
+    Raises:
+        GalleyError: there is no study, or an agent cannot play where a study lets it.
+        InvalidFiles: all that is wrong with a file that a study needs.
+    """
+    content = Content(_studies(workspace, only), load_layouts(workspace), Catalogue(workspace))
+    warm()
+    _rehearse(content.studies, content.layouts, content.agents)
+    return content
+
+
+def _studies(workspace: Workspace, only: str) -> Mapping[str, Study]:
+    names = (only,) if only else workspace.names("studies")
+    if not names:
+        raise GalleyError(
+            f"{workspace.path / 'studies'}: there is no study to serve; write one, see docs/first-study.md"
+        )
+    return {name: load_study(workspace, name) for name in names}
+
+
+def _rehearse(studies: Mapping[str, Study], layouts: Mapping[str, Layout], catalogue: Catalogue) -> None:
+    """Let every agent act on every layout that a visit can bring it to, from both seats.
+
+    Raises: GalleyError naming agent and layout when one cannot.
+    """
+    met = {
+        (name, round_layout(layouts, data))
+        for study in studies.values()
+        for data in _rounds(study)
+        for name in _agents_of(data)
+    }
+    for name, layout in sorted(met, key=lambda pair: (pair[0], pair[1].name)):
+        bundle = catalogue.bundle(name)
+        try:
+            for seat in (0, 1):
+                agent = bundle.make()
+                agents = (agent, Stay()) if seat == 0 else (Stay(), agent)
+                play_episode(layout, agents, seed=0, ticks=REHEARSED_TICKS)
+        except GalleyError:
+            raise
+        except Exception as error:
+            raise GalleyError(
+                f"agents/{name}: it cannot play on layout {layout.name} ({type(error).__name__}: {error}); "
+                "run `galley agents check`"
+            ) from error
+
+
+def _rounds(study: Study) -> Iterator[Mapping[str, Any]]:
+    """The settings of the rounds that visits meet: of some visits in each cell of the design."""
+    for number in range(min(REHEARSED_VISITS, REHEARSED_PER_CELL * len(cells(study.config)))):
+        for step in plan_visit(study, visit_seed(study, number), number).steps:
+            if step.kind == "round":
+                yield step.data
+
+
+def _agents_of(data: Mapping[str, Any]) -> set[str]:
+    """Every agent that may play a round, those that stand in for a person included."""
+    lobby = data.get("lobby", {})
+    names = {data["agent"], lobby.get("fallback"), lobby.get("dropout")}
+    return {name for name in names if name not in NO_AGENTS}
