@@ -61,7 +61,8 @@ def _studies(workspace: Workspace, only: str) -> Mapping[str, Study]:
 def _rehearse(studies: Mapping[str, Study], layouts: Mapping[str, Layout], catalogue: Catalogue) -> None:
     """Let every agent act on every layout that a visit can bring it to, from both seats.
 
-    Raises: GalleyError naming agent and layout when one cannot.
+    Raises:
+        GalleyError: an agent cannot play on a layout; it names both.
     """
     met = {
         (name, round_layout(layouts, data))

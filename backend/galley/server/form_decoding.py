@@ -22,7 +22,8 @@ class FormError(ValueError):
 async def read_form(request: Request, max_bytes: int) -> Mapping[str, list[str]]:
     """Every field of the request's form with its values in order; blank ones are kept.
 
-    Raises: FormError when it is not urlencoded, longer than `max_bytes`, or has more than MAX_FIELDS fields.
+    Raises:
+        FormError: it is not urlencoded, longer than `max_bytes`, or has more than MAX_FIELDS fields.
     """
     kind = request.headers.get("content-type", FORM_TYPE).split(";")[0].strip().lower()
     if kind != FORM_TYPE:

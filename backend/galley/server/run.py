@@ -43,8 +43,8 @@ def serve(
 
     Options that are None come from the environment, see `galley.server.settings`.
 
-    Raises: GalleyError when the port is taken, the database cannot be opened or served, or a study cannot be
-    used.
+    Raises:
+        GalleyError: the port is taken, the database cannot be opened or served, or a study cannot be used.
     """
     settings = read_settings(
         os.environ if environ is None else environ, study=study, host=host, port=port, database=database
@@ -63,7 +63,8 @@ def preview(
 ) -> None:
     """Serve one study as `serve` does, to walk through it: what is recorded is gone at the end.
 
-    Raises: as `serve`.
+    Raises:
+        GalleyError: as `serve`.
     """
     settings = read_settings(os.environ if environ is None else environ, study=study, host=host, port=port)
     with tempfile.TemporaryDirectory(prefix="galley-preview-") as folder:
@@ -157,7 +158,8 @@ def _own_address(other: str, port: int) -> str:
 def listen(settings: Settings) -> socket.socket:
     """The listening socket.
 
-    Raises: GalleyError when the address is taken or not this machine's.
+    Raises:
+        GalleyError: the address is taken or not this machine's.
     """
     family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
     try:

@@ -63,7 +63,8 @@ SETTINGS: tuple[Setting, ...] = tuple(Setting(row.name, **row.metadata) for row 
 def read_settings(environ: Mapping[str, str], **options: Any) -> Settings:
     """The settings: an option that is not None goes before the environment, which goes before the default.
 
-    Raises: GalleyError naming the setting, its value and what it may be.
+    Raises:
+        GalleyError: a value is not possible; it names the setting, the value and what it may be.
     """
     if unknown := set(options) - {setting.name for setting in SETTINGS}:
         raise TypeError(f"no such setting: {', '.join(sorted(unknown))}")

@@ -21,7 +21,8 @@ FORMS = "sqlite:///FILE or postgresql://HOST/NAME"
 def database_url(database: str | Path) -> URL:
     """The URL that `database` means: a URL as it stands, or the path of an SQLite file.
 
-    Raises: GalleyError for a database that Galley cannot keep records in.
+    Raises:
+        GalleyError: a database that Galley cannot keep records in.
     """
     text = str(database)
     if "://" not in text:
@@ -53,7 +54,8 @@ def shown(url: URL) -> str:
 def connect(url: URL, *, writes: bool, migrates: bool = False) -> Engine:
     """An engine on `url`; one that does not write refuses to, one that migrates may rebuild tables.
 
-    Raises: GalleyError if the driver is missing.
+    Raises:
+        GalleyError: the driver is missing.
     """
     try:
         if url.get_backend_name() == "sqlite":

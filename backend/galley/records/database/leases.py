@@ -66,7 +66,8 @@ def take(
 
     `address` is where other processes reach the owner.
 
-    Raises: GalleyError if there is no such round.
+    Raises:
+        GalleyError: there is no such round.
     """
     if connection.execute(select(ROUNDS.c.id).where(ROUNDS.c.id == round_id)).first() is None:
         raise GalleyError(f"there is no round {round_id}")

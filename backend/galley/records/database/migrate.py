@@ -27,7 +27,9 @@ def migrate(url: URL, *, locked: bool, scripts: Path = SCRIPTS) -> None:
     """Run every migration that is still missing, all in one transaction.
 
     `locked` tells whether the serving lock of an SQLite file is held already.
-    Raises: GalleyError if the database is newer than this Galley, is not Galley's, or is being served.
+
+    Raises:
+        GalleyError: the database is newer than this Galley, is not Galley's, or is being served.
     """
     config = Config()
     config.set_main_option("script_location", str(scripts).replace("%", "%%"))

@@ -86,7 +86,11 @@ class Writer:
         return done
 
     def journal(self, round_id: int, rows: Journal) -> None:
-        """Keep `rows` for the next flush. Raises GalleyError after `close`."""
+        """Keep `rows` for the next flush.
+
+        Raises:
+            GalleyError: after `close`.
+        """
         with self._lock:
             if self._closing.is_set():
                 raise GalleyError("the records are closed")
@@ -126,7 +130,8 @@ class Writer:
     def close(self) -> None:
         """Finish the jobs, write the journal, stop the thread.
 
-        Raises: GalleyError if journalled rows could not be written.
+        Raises:
+            GalleyError: journalled rows could not be written.
         """
         with self._lock:
             if self._closing.is_set():

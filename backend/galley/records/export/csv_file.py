@@ -62,11 +62,12 @@ class CsvFile(PartFile):
     def write(self, values: Mapping[str, Any]) -> None:
         """Add a row: a value, or None, for every column.
 
-        Raises: KeyError for a column left out.
+        Raises:
+            KeyError: a column left out.
         """
         self._csv.writerow([cell(field.kind, values[field.name]) for field in self.sheet.fields])
         self.rows += 1
 
     def close(self) -> None:
-        """Nothing more is written."""
+        """Write what is left and let the file go."""
         self._file.close()

@@ -38,12 +38,16 @@ class JsonLinesFile(PartFile):
         self._file = self.part.open("w", encoding="utf-8", errors="backslashreplace", newline="")
 
     def write(self, values: Mapping[str, Any]) -> None:
-        """Add a row: a value, or None, for every column. Raises KeyError for a column left out."""
+        """Add a row: a value, or None, for every column.
+
+        Raises:
+            KeyError: a column left out.
+        """
         row = {field.name: plain(field.kind, values[field.name]) for field in self.sheet.fields}
         json.dump(row, self._file, ensure_ascii=False, separators=(",", ":"))
         self._file.write("\n")
         self.rows += 1
 
     def close(self) -> None:
-        """Nothing more is written."""
+        """Write what is left and let the file go."""
         self._file.close()

@@ -26,7 +26,11 @@ def _arrow() -> Any:
 
 
 class ParquetFile(PartFile):
-    """One file of an export as Parquet. Raises GalleyError if PyArrow is not installed."""
+    """One file of an export as Parquet.
+
+    Raises:
+        GalleyError: PyArrow is not installed.
+    """
 
     ending = "parquet"
 
@@ -48,7 +52,11 @@ class ParquetFile(PartFile):
         self._columns: list[list[Any]] = [[] for _ in sheet.fields]
 
     def write(self, values: Mapping[str, Any]) -> None:
-        """Add a row: a value, or None, for every column. Raises KeyError for a column left out."""
+        """Add a row: a value, or None, for every column.
+
+        Raises:
+            KeyError: a column left out.
+        """
         for column, field in zip(self._columns, self.sheet.fields, strict=True):
             column.append(_typed(field.kind, values[field.name]))
         self.rows += 1

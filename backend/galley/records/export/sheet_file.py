@@ -26,11 +26,15 @@ class PartFile(ABC):
 
     @abstractmethod
     def write(self, values: Mapping[str, Any]) -> None:
-        """Add a row: a value, or None, for every column. Raises KeyError for a column left out."""
+        """Add a row: a value, or None, for every column.
+
+        Raises:
+            KeyError: a column left out.
+        """
 
     @abstractmethod
     def close(self) -> None:
-        """Nothing more is written."""
+        """Write what is left and let the file go."""
 
     def __enter__(self) -> Self:
         return self

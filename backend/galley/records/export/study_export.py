@@ -60,8 +60,10 @@ def export_study(
 
     Everything is read from the database as it stood at the start, however long the export takes. Visits made
     to try the study out are left out unless `include_test`.
-    Raises: GalleyError if nobody visited the study, a format is unknown or lacks its library, or the folder
-    cannot be written.
+
+    Raises:
+        GalleyError: nobody visited the study, a format is unknown or lacks its library, or the folder cannot
+            be written.
     """
     unknown = [name for name in formats if name not in FORMATS]
     if unknown or not formats:

@@ -29,7 +29,8 @@ DATE = (1980, 1, 1, 0, 0, 0)
 def export_trajectories(store: Store, study: str, out: Path, include_test: bool = False) -> int:
     """Episodes written to the zip file `out`: `PARTICIPANT-ROUND[-EPISODE].jsonl`, as `galley.kitchen` reads.
 
-    Raises: GalleyError if nobody visited the study or the file cannot be written.
+    Raises:
+        GalleyError: nobody visited the study or the file cannot be written.
     """
     written = 0
     try:
@@ -53,7 +54,9 @@ def export_human_data(store: Store, study: str, out: Path, include_test: bool = 
     """Ticks written to `out`, Parquet if it ends so and CSV otherwise, in the schema of HUMAN_DATA.
 
     Rounds that do not replay to what was stored are left out.
-    Raises: GalleyError if nobody visited the study or the file cannot be written.
+
+    Raises:
+        GalleyError: nobody visited the study or the file cannot be written.
     """
     kind: type[PartFile] = ParquetFile if out.suffix == ".parquet" else CsvFile
     try:

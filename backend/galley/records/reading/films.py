@@ -11,7 +11,8 @@ from galley.records.store.store import Store
 def footage_of_round(store: Store, round_id: int) -> Footage:
     """What there is to film of a round, as far as it was played: all its episodes, at its own pace and hats.
 
-    Raises: GalleyError if there is no such round, or nothing of it can be drawn.
+    Raises:
+        GalleyError: there is no such round, or nothing of it can be drawn.
     """
     with store.reading() as connection:
         row = queries.round_row(connection, round_id)

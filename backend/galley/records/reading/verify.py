@@ -57,7 +57,9 @@ def verify_study(store: Store, study: str) -> VerifyReport:
 
     Compared are the numbering of the ticks, the length of finished rounds, and the stored score, deliveries
     and hash of the last state. An open round has no end to compare; it must replay as far as it goes.
-    Raises: GalleyError if nobody visited the study.
+
+    Raises:
+        GalleyError: nobody visited the study.
     """
     rounds = ticks = still_open = 0
     faults = []

@@ -31,8 +31,10 @@ def erase_participant(store: Store, who: str | int) -> Erased:
     Slots that were completed stay completed, and every other row keeps its id and its place. A match that is
     under way must be stopped before. With SQLite the file is rewritten, so that nothing is left in its pages
     or its log; with PostgreSQL the tables are, while its write-ahead log keeps old pages until it is reused.
-    Raises: GalleyError if there is no such participant, or another program keeps the old pages in use (then
-    erase once more when that has ended).
+
+    Raises:
+        GalleyError: there is no such participant, or another program keeps the old pages in use (then erase
+            once more when that has ended).
     """
     erased = store.write(lambda connection: _erase(connection, who), first="all").result()
     scrub(store.engine)
@@ -67,7 +69,8 @@ def _erase(connection: Connection, who: str | int) -> Erased:
 def scrub(engine: Engine) -> None:
     """Rewrite the database so that nothing deleted is left in its files.
 
-    Raises: GalleyError if another program keeps the old pages in use for too long.
+    Raises:
+        GalleyError: another program keeps the old pages in use for too long.
     """
     if engine.dialect.name == "sqlite":
         _scrub_sqlite(engine)

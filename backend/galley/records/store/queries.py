@@ -20,7 +20,11 @@ def studies(connection: Connection) -> tuple[str, ...]:
 
 
 def must_know(connection: Connection, database: str, study: str) -> None:
-    """Nothing, if somebody visited the study. Raises GalleyError otherwise, naming the studies there are."""
+    """Make sure that somebody visited the study.
+
+    Raises:
+        GalleyError: nobody did; it names the studies there are.
+    """
     known = studies(connection)
     if study not in known:
         there = f"it has {', '.join(known)}" if known else "nobody has visited any study"
@@ -87,7 +91,11 @@ def rounds_of_study(connection: Connection, study: str) -> list[int]:
 
 
 def round_row(connection: Connection, round_id: int) -> RoundRow:
-    """The round with this id and its joint actions. Raises GalleyError if there is none."""
+    """The round with this id and its joint actions.
+
+    Raises:
+        GalleyError: there is none.
+    """
     found = connection.execute(select(ROUNDS).where(ROUNDS.c.id == round_id)).mappings().one_or_none()
     if found is None:
         raise GalleyError(f"there is no round {round_id}")

@@ -163,11 +163,16 @@ class RoundStore(StoreBase):
     def trajectory(self, round_id: int) -> Trajectory:
         """The first episode of a round as far as it is committed, ready to be replayed.
 
-        Raises: GalleyError if there is no such round, or what is stored cannot be played.
+        Raises:
+            GalleyError: there is no such round, or what is stored cannot be played.
         """
         return self.trajectories(round_id)[0]
 
     def trajectories(self, round_id: int) -> tuple[Trajectory, ...]:
-        """All episodes of a round as far as they are committed, at least one. Raises as `trajectory`."""
+        """All episodes of a round as far as they are committed, at least one.
+
+        Raises:
+            GalleyError: as `trajectory`.
+        """
         with self.reading() as connection:
             return trajectories_of(queries.round_row(connection, round_id))

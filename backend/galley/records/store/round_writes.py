@@ -22,7 +22,8 @@ from galley.records.store.visit_writes import keep_questions, new_id
 def set_up(connection: Connection, new: NewRound) -> int:
     """The id of the round that its people play at these steps, made now if there is none.
 
-    Raises: GalleyError if a visit is unknown, or sits in another round at that step.
+    Raises:
+        GalleyError: a visit is unknown, or sits in another round at that step.
     """
     people = [seat for seat in new.seats if seat.visit_id is not None]
     there = {_round_at(connection, seat) for seat in people}
@@ -65,7 +66,11 @@ def stand_in(connection: Connection, round_id: int, values: Mapping[str, Any], l
 
 
 def must_hold(connection: Connection, lease: Lease | None) -> None:
-    """Nothing, if the lease stands; it does until this transaction is over. Raises LeaseLost otherwise."""
+    """Keep the lease from being taken until this transaction is over.
+
+    Raises:
+        LeaseLost: another process has taken the round over.
+    """
     if lease is not None and leases.fence(connection, [lease]):
         lease.lose()
         raise LeaseLost(f"round {lease.round_id} was taken over by another server")
@@ -81,7 +86,11 @@ def finish(
     final_state: bytes,
     lease: Lease | None,
 ) -> bool:
-    """Close the round and count its ticks, unless it was closed before. Raises LeaseLost."""
+    """Close the round and count its ticks, unless it was closed before.
+
+    Raises:
+        LeaseLost: another process has taken the round over.
+    """
     must_hold(connection, lease)
     closing = {
         "status": status,

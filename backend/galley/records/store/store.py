@@ -36,8 +36,10 @@ class Store(VisitStore, RoundStore):
 
         `flush_every_s` is the most that the journal waits, `retry_for_s` how long writes and reads wait for a
         database server that is away.
-        Raises: GalleyError if it cannot be opened, is newer than this Galley, does not exist though it must,
-        or is to be served and is served already.
+
+        Raises:
+            GalleyError: it cannot be opened, is newer than this Galley, does not exist though it must, or is
+                to be served and is served already.
         """
         url = database_url(database)
         file = sqlite_file(url)

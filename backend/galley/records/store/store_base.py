@@ -99,7 +99,8 @@ class StoreBase:
     def close(self) -> None:
         """Write what waits, then let go of the database; a second call does nothing.
 
-        Raises: GalleyError if journalled rows could not be written.
+        Raises:
+            GalleyError: journalled rows could not be written.
         """
         self._closing.set()
         try:

@@ -174,7 +174,8 @@ class VisitStore(StoreBase):
     def set_study_state(self, study: str, state: str, at_ms: float) -> Future[None]:
         """Open, pause or close a study for new visits; those that run go on.
 
-        Raises: ValueError if there is no such state.
+        Raises:
+            ValueError: there is no such state.
         """
         if state not in STUDY_STATES:
             raise ValueError(f"no state of a study: {state!r}; use one of {STUDY_STATES}")

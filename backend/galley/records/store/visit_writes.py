@@ -104,7 +104,8 @@ class LeftStep:
 def leave_step(connection: Connection, left: LeftStep) -> bool:
     """Store the answers and move on, unless the step was left before or the visit is over.
 
-    Raises: GalleyError if the visit is unknown.
+    Raises:
+        GalleyError: the visit is unknown.
     """
     visit = active(connection, left.visit_id)
     if visit is None:
@@ -132,7 +133,8 @@ def leave_step(connection: Connection, left: LeftStep) -> bool:
 def active(connection: Connection, visit_id: int) -> Mapping[str, Any] | None:
     """The visit's row, kept from others until this transaction is over; None if the visit is over.
 
-    Raises: GalleyError if the visit is unknown.
+    Raises:
+        GalleyError: the visit is unknown.
     """
     query = select(VISITS.c.study, VISITS.c.step_index, VISITS.c.status, VISITS.c.test)
     found = (
@@ -223,7 +225,11 @@ def set_study_state(connection: Connection, study: str, state: str, at_ms: int) 
 
 
 def add_note(connection: Connection, visit_id: int, author: str, text: str, at_ms: int) -> int:
-    """The id of a new note. Raises GalleyError if the visit is unknown."""
+    """The id of a new note.
+
+    Raises:
+        GalleyError: the visit is unknown.
+    """
     if connection.execute(select(VISITS.c.id).where(VISITS.c.id == visit_id)).first() is None:
         raise GalleyError(f"there is no visit {visit_id}")
     return new_id(connection, NOTES, {"visit_id": visit_id, "author": author, "text": text, "at_ms": at_ms})

@@ -27,7 +27,8 @@ TABLES = ("csv", "jsonl", "parquet")
 def write_export(database: str, study: str, kind: str, tests: bool, out: Path) -> None:
     """Write one kind of export of a study to the file `out`.
 
-    Raises: GalleyError when the database or the study is not there.
+    Raises:
+        GalleyError: the database or the study is not there.
     """
     with Store.open(database, must_exist=True) as store:
         if kind in TABLES:
@@ -43,7 +44,8 @@ def write_export(database: str, study: str, kind: str, tests: bool, out: Path) -
 def write_round_film(database: str, round_id: int, out: Path) -> None:
     """Write a round as a film to the file `out`, a .gif or .mp4.
 
-    Raises: GalleyError when there is no such round, or the extra `video` is missing.
+    Raises:
+        GalleyError: there is no such round, or the extra `video` is missing.
     """
     with Store.open(database, must_exist=True) as store:
         filmed = footage_of_round(store, round_id)

@@ -27,7 +27,8 @@ class Passwords:
     def hashed(self, password: str) -> str:
         """What is stored of a password.
 
-        Raises: GalleyError when it is too short or too long.
+        Raises:
+            GalleyError: it is too short or too long.
         """
         if not SHORTEST <= len(password) <= LONGEST:
             raise GalleyError(f"a password has {SHORTEST} to {LONGEST} characters, not {len(password)}")
@@ -45,7 +46,8 @@ class Passwords:
 def checked_name(name: str) -> str:
     """The name of a researcher as it is kept.
 
-    Raises: GalleyError when it cannot be a name.
+    Raises:
+        GalleyError: it cannot be a name.
     """
     kept = name.strip()
     if not kept or len(kept) > LONGEST_NAME or not kept.isprintable():
