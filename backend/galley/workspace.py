@@ -47,8 +47,8 @@ class Workspace:
 
     @property
     def database(self) -> str:
-        """URL of the workspace's own records, for when no other database is named."""
-        return f"sqlite:///{self.path.resolve() / '.data' / 'galley.sqlite'}"
+        """The file of the workspace's own records, for when no other database is named."""
+        return str(self.path.resolve() / ".data" / "galley.sqlite")
 
     @staticmethod
     def suffix(kind: Kind) -> str:

@@ -20,6 +20,8 @@ CLASSES: dict[str, str] = {
     "HEAD /healthz": OPEN,
     "GET /s/{study}": OPEN,
     "HEAD /s/{study}": OPEN,
+    "GET /s/{study}/begin": OPEN,
+    "HEAD /s/{study}/begin": OPEN,
     "POST /s/{study}/begin": OPEN,
     "MOUNT /static": OPEN,
     "GET /v/{token}": TOKEN,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from urllib.parse import parse_qsl
 
-from starlette.requests import Request
+from starlette.requests import ClientDisconnect, Request
 
 MAX_FIELDS = 1000
 FORM_TYPE = "application/x-www-form-urlencoded"
@@ -23,16 +23,19 @@ async def read_form(request: Request, max_bytes: int) -> Mapping[str, list[str]]
     """Every field of the request's form with its values in order; blank ones are kept.
 
     Raises:
-        FormError: it is not urlencoded, longer than `max_bytes`, or has more than MAX_FIELDS fields.
+        FormError: it is not urlencoded, longer than `max_bytes`, breaks off, or has more than MAX_FIELDS fields.
     """
     kind = request.headers.get("content-type", FORM_TYPE).split(";")[0].strip().lower()
     if kind != FORM_TYPE:
         raise FormError(415, f"forms are sent as {FORM_TYPE}")
     body = bytearray()
-    async for chunk in request.stream():
-        body += chunk
-        if len(body) > max_bytes:
-            raise FormError(413, f"forms have at most {max_bytes} bytes")
+    try:
+        async for chunk in request.stream():
+            body += chunk
+            if len(body) > max_bytes:
+                raise FormError(413, f"forms have at most {max_bytes} bytes")
+    except ClientDisconnect:  # nobody is there to read an answer
+        raise FormError(400, "the form broke off") from None
     try:
         pairs = parse_qsl(body.decode("ascii", "replace"), keep_blank_values=True, max_num_fields=MAX_FIELDS)
     except ValueError as error:

@@ -7,7 +7,7 @@ import signal
 import socket
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,9 @@ from galley.errors import GalleyError
 from galley.records import Store
 from galley.server.app import create_app
 from galley.server.content import load_content
+from galley.server.request_bounds import BoundedHttp
 from galley.server.settings import Settings, read_settings
+from galley.server.socket_bounds import BoundedWebSocket
 from galley.workspace import Workspace
 
 MAX_FRAME_BYTES = 256 * 1024
@@ -39,7 +41,7 @@ def serve(
     database: str | None = None,
     environ: Mapping[str, str] | None = None,
 ) -> None:
-    """Serve a workspace until SIGINT or SIGTERM; prints the URL once it listens.
+    """Serve a workspace until SIGINT or SIGTERM; prints its URL and each study's once it listens.
 
     Options that are None come from the environment, see `galley.server.settings`.
 
@@ -86,7 +88,9 @@ def _serve(workspace: Workspace, settings: Settings, database: str, *, preview: 
             # After its own shutdown uvicorn raises the signal again; the records must be closed then too.
             signal.signal(signal.SIGTERM, signal.default_int_handler)
             try:
-                Announcing(server_config(app, settings), settings, listening).run(sockets=[listening])
+                config = server_config(app, settings)
+                names = (settings.study,) if settings.study else workspace.names("studies")
+                Announcing(config, settings, listening, names).run(sockets=[listening])
             except KeyboardInterrupt:
                 return
     finally:
@@ -98,8 +102,9 @@ def server_config(app: FastAPI, settings: Settings) -> uvicorn.Config:
     return uvicorn.Config(
         app,
         loop="auto",
+        http=BoundedHttp,
         lifespan="on",
-        ws="websockets-sansio",
+        ws=BoundedWebSocket,
         ws_max_size=MAX_FRAME_BYTES,
         ws_per_message_deflate=False,
         ws_ping_interval=PING_EVERY_S,
@@ -114,20 +119,26 @@ def server_config(app: FastAPI, settings: Settings) -> uvicorn.Config:
 class Announcing(uvicorn.Server):
     """A server that says where it is as soon as it can be reached."""
 
-    def __init__(self, config: uvicorn.Config, settings: Settings, listening: socket.socket) -> None:
+    def __init__(
+        self, config: uvicorn.Config, settings: Settings, listening: socket.socket, studies: Sequence[str]
+    ) -> None:
         super().__init__(config)
         self._settings = settings
+        self._studies = studies
         self._port = listening.getsockname()[1]
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Start, then print the URL."""
+        """Start, then print the URLs."""
         await super().startup(sockets)
         if self.started:
             host = self._settings.host
             anywhere = {"0.0.0.0": "127.0.0.1", "::": "::1"}  # noqa: S104
             reached = anywhere.get(host, host)
             shown = f"[{reached}]" if ":" in reached else reached
-            sys.stdout.write(f"http://{shown}:{self._port}\n")
+            root = f"http://{shown}:{self._port}"
+            # Each study's own link: what people are sent begins there, not at the root.
+            links = [f"{root}/s/{name}" for name in self._studies]
+            sys.stdout.write("".join(f"{url}\n" for url in (root, *links)))
             sys.stdout.flush()
 
 

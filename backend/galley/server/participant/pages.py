@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any
-from urllib.parse import urlencode
+from urllib.parse import quote, urlencode
 
 import jinja2
 from fastapi import APIRouter, Request
@@ -98,6 +98,7 @@ class Pages:
         router.add_api_route("/healthz", self.health, methods=["GET", "HEAD"], response_model=None)
         router.add_api_route("/s/{study}", self.landing, methods=["GET", "HEAD"], **shown)
         router.add_api_route("/s/{study}/begin", self.begin, methods=["POST"], **shown)
+        router.add_api_route("/s/{study}/begin", self.back_to_landing, methods=["GET", "HEAD"], **shown)
         router.add_api_route("/v/{token}", self.visit, methods=["GET", "HEAD"], **shown)
         router.add_api_route("/v/{token}", self.submit, methods=["POST"], **shown)
         router.add_api_route("/v/{token}/away", self.away, methods=["POST"], response_model=None)
@@ -108,9 +109,11 @@ class Pages:
 
     async def home(self, request: Request) -> Response:
         """The study when there is one, else a list."""
+        query = _query(request)
         if len(self._studies) == 1:
-            return RedirectResponse(f"/s/{next(iter(self._studies))}", 303)
-        return self._page("studies.html", studies=[public_study(study) for study in self._studies.values()])
+            return RedirectResponse(f"/s/{next(iter(self._studies))}{query}", 303)
+        studies = [public_study(study) for study in self._studies.values()]
+        return self._page("studies.html", studies=studies, query=query)
 
     async def health(self) -> Response:
         """Whether what happens reaches the database."""
@@ -146,6 +149,10 @@ class Pages:
             languages=offered,
             test=TEST_PARAM in params,
         )
+
+    async def back_to_landing(self, request: Request, study: str) -> Response:
+        """The way from the address of the form back to the page with its button, for who loads it again."""
+        return RedirectResponse(f"/s/{quote(study)}{_query(request)}", 303)
 
     async def begin(self, request: Request, study: str) -> Response:
         """A new visit, or the one that this person has; the answer leads to its page."""
@@ -313,6 +320,11 @@ class Pages:
     def _page(self, template: str, status_code: int = 200, /, **values: Any) -> Response:
         html = self._templates.get_template(template).render(**values)
         return HTMLResponse(html, status_code, NEVER_CACHED)
+
+
+def _query(request: Request) -> str:
+    """The query as it came, with its question mark."""
+    return f"?{request.url.query}" if request.url.query else ""
 
 
 def _link_params(request: Request) -> dict[str, str]:

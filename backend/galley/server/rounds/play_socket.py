@@ -10,6 +10,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from galley.protocol import messages as wire
 from galley.server.headers import same_origin
+from galley.server.limits import Pace
 from galley.server.participant.visits import Visits
 from galley.server.rounds.match import LEFT, RESTART
 from galley.server.rounds.matches import Matches, Place, RoundBusy
@@ -82,26 +83,6 @@ class Socket:
         except (WebSocketDisconnect, RuntimeError, OSError):
             # The browser is gone; the listening side sees it too and tells the match.
             return
-
-
-class Pace:
-    """Keeps a connection to so many messages a second, with two seconds' worth at once."""
-
-    def __init__(self, per_s: float, now_s: float) -> None:
-        self._per_s = per_s
-        self._left = 2.0 * per_s
-        self._at_s = now_s
-
-    def wait_s(self, now_s: float) -> float:
-        """How long to wait before taking the next message."""
-        self._left = min(2.0 * self._per_s, self._left + (now_s - self._at_s) * self._per_s) - 1.0
-        self._at_s = now_s
-        return max(0.0, -self._left / self._per_s)
-
-    async def wait(self) -> None:
-        """Return when the next message may be taken."""
-        if wait_s := self.wait_s(asyncio.get_running_loop().time()):
-            await asyncio.sleep(wait_s)
 
 
 class Play:
