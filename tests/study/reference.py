@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from pydantic.fields import FieldInfo
 
 from galley.files.reading import FileModel
-from galley.study.written import factors, items, languages, questionnaire, recruitment, stages
+from galley.study.written import factors, item_base, items, languages, questionnaire, recruitment, stages
 from galley.study.written import study_file as config
 from tests.study.workspaces import ROOT
 
@@ -28,7 +28,13 @@ ITEMS = get_args(get_args(items.Item)[0])
 PARTS = (
     *(config.StudyFile, stages.Kitchen, stages.Lobby, factors.Factor, factors.Condition),
     *(recruitment.Completion, recruitment.EndingFile, recruitment.Endings),
-    *(recruitment.Attention, recruitment.Recruitment, questionnaire.Questionnaire, items.Option, items.When),
+    *(
+        recruitment.Attention,
+        recruitment.Recruitment,
+        questionnaire.Questionnaire,
+        item_base.Option,
+        item_base.When,
+    ),
 )
 MODELS: dict[str, type[FileModel]] = {model.__name__: model for model in (*PARTS, *STAGES)}
 MODELS |= {f"Item{model.__name__}": model for model in ITEMS}

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from galley.study.scores import signed_preference, subscale_scores, wrong_items
+from galley.study.scores import subscale_scores, wrong_items
 from galley.study.visit.plan import item_order
-from galley.study.written.questionnaire import load_questionnaire, rank_field, validate_answers
+from galley.study.written.item_base import BaseItem
+from galley.study.written.items import Item, stored_item
+from galley.study.written.questionnaire import load_questionnaire, validate_answers
 from tests.study.workspaces import ROOT
 from tests.study.written.test_questionnaire import OPTIONS, SCALE, made
 
@@ -66,7 +68,7 @@ def test_a_slider_that_need_not_be_answered_stores_nothing_untouched() -> None:
 
 
 def ranked(**places: str) -> dict[str, list[str]]:
-    return {rank_field("q0", value): [place] for value, place in places.items()}
+    return {f"q0.{value}": [place] for value, place in places.items()}
 
 
 RANKING = {"kind": "ranking", "options": THREE}
@@ -85,7 +87,7 @@ def test_a_ranking_is_stored_with_the_first_place_first() -> None:
         ranked(a="1", b="1", c="2"),
         ranked(a="0", b="1", c="2"),
         ranked(a="1", b="2", c="4"),
-        {**ranked(a="1", b="2"), rank_field("q0", "c"): ["3", "3"]},
+        {**ranked(a="1", b="2"), "q0.c": ["3", "3"]},
     ],
 )
 def test_a_ranking_needs_every_place_once(form: dict[str, list[str]]) -> None:
@@ -122,8 +124,64 @@ def test_wrong_answers_of_a_quiz_come_with_their_hints() -> None:
 
 def test_preferences_are_signed_from_the_middle_of_the_scale() -> None:
     item = made({"kind": "comparison", **SCALE}).items[0]
-    assert [signed_preference(item, point) for point in (1, 4, 7)] == [-3, 0, 3]  # type: ignore[arg-type]
-    assert signed_preference(item, None) is None  # type: ignore[arg-type]
+    assert [item.preference(point) for point in (1, 4, 7)] == [-3, 0, 3]
+    assert item.preference(None) is None
+
+
+def test_numbers_are_told_with_all_their_digits() -> None:
+    wide = {"kind": "number", "min": 0, "max": 1234567}
+    assert answer(wide, {"q0": ["1234568"]})[1] == "Please enter a number from 0 to 1234567."
+    assert answer({**SLIDER, "max": 1234567}, {"q0": ["-1"]})[1] == "Please choose a point from 0 to 1234567."
+    assert (
+        answer({**SLIDER, "max": 0.5, "step": 0.1}, {"q0": ["1"]})[1]
+        == "Please choose a point from 0 to 0.5."
+    )
+
+
+KINDS = get_args(get_args(Item)[0])
+FILLED: dict[str, tuple[dict[str, Any], dict[str, list[str]]]] = {
+    "likert": (SCALE, {"q0": ["3"]}),
+    "semantic_differential": (SCALE, {"q0": ["3"]}),
+    "comparison": (SCALE, {"q0": ["3"]}),
+    "single_choice": ({"options": THREE}, {"q0": ["b"]}),
+    "multiple_choice": ({"options": THREE}, {"q0": ["a", "c"]}),
+    "ranking": ({"options": THREE}, {"q0.a": ["2"], "q0.b": ["3"], "q0.c": ["1"]}),
+    "number": ({"min": 0, "max": 1, "whole": False}, {"q0": ["0.25"]}),
+    "slider": (SLIDER, {"q0": ["35"]}),
+    "short_text": ({}, {"q0": ["fine"]}),
+    "long_text": ({}, {"q0": ["fine\nindeed"]}),
+}
+"""Of each kind one item and a form that answers it."""
+
+
+@pytest.mark.parametrize("model", KINDS, ids=lambda model: model.__name__)
+def test_every_kind_of_item_goes_from_form_to_answer_and_back(model: type[BaseItem]) -> None:
+    kind = get_args(model.model_fields["kind"].annotation)[0]
+    own, form = FILLED[kind]
+    questionnaire = made({"kind": kind, **own})
+    answers, problems = validate_answers(questionnaire, form)
+    item = questionnaire.items[0]
+    assert problems == {}
+    assert item.as_sent(answers["q0"]) == form
+    assert item.as_sent(None) == {}
+    assert stored_item(item.model_dump(mode="json")) == item
+    assert validate_answers(questionnaire, {})[1].keys() == {"q0"}
+
+
+def test_what_was_stored_of_an_item_that_nobody_knows_any_more_is_no_item() -> None:
+    assert stored_item(None) is None
+    assert stored_item({"kind": "telepathy", "id": "q0", "text": "?"}) is None
+
+
+def test_labels_are_the_words_that_were_shown() -> None:
+    items = made(
+        {"kind": "multiple_choice", "options": THREE},
+        {"kind": "likert", **SCALE, "scale": 2, "labels": ["low", "high"]},
+        {"kind": "likert", **SCALE},
+    ).items
+    assert items[0].label_of(["a", "c"]) == "A | C"
+    assert [item.label_of(2) for item in items[1:]] == ["high", None]
+    assert [item.label_of(None) for item in items] == [None, None, None]
 
 
 def test_subscales_are_averaged_with_reversed_items_turned_round() -> None:
@@ -134,8 +192,8 @@ def test_subscales_are_averaged_with_reversed_items_turned_round() -> None:
         {"kind": "likert", **SCALE},
     )
     answers = {"q0": 6, "q1": 1, "q2": 40, "q3": 2}
-    assert subscale_scores(questionnaire, answers) == {"trust": 6.5, "load": 40}
-    assert subscale_scores(questionnaire, {**answers, "q1": None})["trust"] is None
+    assert subscale_scores(questionnaire.items, answers) == {"trust": 6.5, "load": 40}
+    assert subscale_scores(questionnaire.items, {**answers, "q1": None})["trust"] is None
 
 
 def test_items_in_random_order_stay_behind_what_they_depend_on() -> None:
@@ -166,7 +224,9 @@ def test_nasa_tlx_has_six_scales_of_twenty_one_gradations_and_fifteen_pairs() ->
         assert item.kind == "slider"
         assert (item.max - item.min) / item.step + 1 == 21
     assert (tlx.items[3].low_label, tlx.items[3].high_label) == ("Perfect", "Failure")
-    assert subscale_scores(tlx, {item.id: 20 * n for n, item in enumerate(tlx.items)}) == {"workload": 50}
+    assert subscale_scores(tlx.items, {item.id: 20 * n for n, item in enumerate(tlx.items)}) == {
+        "workload": 50
+    }
     weights = load_questionnaire(ROOT / "questionnaires" / "nasa-tlx-weights.yaml").value
     pairs = {frozenset(option.value for option in item.options) for item in weights.items}  # type: ignore[union-attr]
     assert len(pairs) == 15

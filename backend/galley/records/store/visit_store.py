@@ -12,7 +12,7 @@ from galley.records.store import absences, arrivals, queries, visit_writes
 from galley.records.store.arrivals import Allocate, Plan
 from galley.records.store.store_base import StoreBase
 from galley.records.store.visit_ids import link_secret, participant_name
-from galley.study.written.questionnaire import Questionnaire
+from galley.study.written.questionnaire import Questionnaire, failed_checks, verdicts
 
 
 class VisitStore(StoreBase):
@@ -86,19 +86,21 @@ class VisitStore(StoreBase):
     ) -> Future[bool]:
         """Store a step's answers and move the visit on, in one transaction.
 
-        `questionnaire` is the one that was answered; its items are kept as they were shown.
+        `questionnaire` is the one that was answered; its items are kept as they were shown, each with its
+        verdict on the answer.
         `consent_sha256` is the hash of the text that was agreed to. A status other than "active" ends the
         visit and completes its slot, or leaves it to be given out again. False, and nothing changed, if the
         step was left before (the same form sent twice counts once) or the visit is over.
         """
         shown = _shown(questionnaire)
+        passed = {} if questionnaire is None else verdicts(questionnaire, answers)
         rows = [
             {
                 "position": position,
                 "item": item,
                 "value": value,
                 "shown": shown.get(item),
-                "passed": _passed(shown.get(item, {}), value),
+                "passed": passed.get(item),
             }
             for position, (item, value) in enumerate(answers.items(), 1)
         ]
@@ -118,13 +120,12 @@ class VisitStore(StoreBase):
         questionnaire: Questionnaire | None = None,
     ) -> Future[bool]:
         """Keep failed attempt number `attempt` (from 1) at a quiz; the visit stays where it is."""
-        shown = _shown(questionnaire)
-        wrong = [item for item, value in answers.items() if _passed(shown.get(item, {}), value) is False]
+        wrong = () if questionnaire is None else failed_checks(questionnaire, answers)
         values = {
             "step_id": step_id,
             "attempt": attempt,
             "answers": dict(answers),
-            "wrong": wrong,
+            "wrong": list(wrong),
             "at_ms": round(at_ms),
         }
         return self.write(lambda connection: visit_writes.save_attempt(connection, visit_id, values))
@@ -193,9 +194,3 @@ def _status(status: str) -> str:
 def _shown(questionnaire: Questionnaire | None) -> dict[str, dict[str, Any]]:
     items = () if questionnaire is None else questionnaire.items
     return {item.id: item.model_dump(mode="json") for item in items}
-
-
-def _passed(shown: Mapping[str, Any], value: Any) -> bool | None:
-    """Whether a check was answered as expected; None for what is no check or was not asked."""
-    expected = shown.get("expected")
-    return None if expected is None or value is None else value == expected

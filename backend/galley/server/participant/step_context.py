@@ -10,8 +10,8 @@ from galley.server.participant.visits import Visit
 from galley.study.scores import wrong_items
 from galley.study.study import Study
 from galley.study.visit.plan import Step
-from galley.study.written.items import Ranking
-from galley.study.written.questionnaire import Answer, Questionnaire, rank_field
+from galley.study.written.item_base import Answer
+from galley.study.written.questionnaire import Questionnaire
 
 QUESTION_PAGES = ("questionnaire", "comparison", "quiz")
 ROUND_WORDS = (
@@ -149,11 +149,5 @@ def as_sent(questionnaire: Questionnaire, answers: Mapping[str, Answer]) -> dict
     """Answers as the form fields that they came in."""
     sent: dict[str, list[str]] = {}
     for item in questionnaire.items:
-        answer = answers.get(item.id)
-        if answer is None:
-            continue
-        if isinstance(item, Ranking) and isinstance(answer, list):
-            sent |= {rank_field(item.id, value): [str(place)] for place, value in enumerate(answer, 1)}
-        else:
-            sent[item.id] = [str(one) for one in (answer if isinstance(answer, list) else [answer])]
+        sent |= item.as_sent(answers.get(item.id))
     return sent

@@ -13,8 +13,9 @@ from galley.study.visit.condition_slots import cell_number, cell_of_slot, place_
 from galley.study.visit.counterbalance import Turn, bits, orders, picks, spread, together
 from galley.study.visit.steps import STEP_KINDS, Plan, Step, StepKind, condition_data
 from galley.study.written.factors import Counted, resolve
+from galley.study.written.item_base import Say
 from galley.study.written.languages import Words
-from galley.study.written.questionnaire import Questionnaire, Say
+from galley.study.written.questionnaire import Questionnaire
 from galley.study.written.stages import (
     ALONE,
     HUMAN,

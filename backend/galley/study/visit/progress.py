@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final, Literal, get_args
 
 from galley.study.visit.steps import Plan, Step, StepKind
-from galley.study.written.questionnaire import Answer, is_right
+from galley.study.written.item_base import Answer, is_right
 from galley.study.written.recruitment import Outcome as VisitOutcome
 
 Status = Literal["active"] | VisitOutcome

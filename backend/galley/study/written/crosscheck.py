@@ -11,8 +11,6 @@ from galley.kitchen import Layout
 from galley.kitchen.reach import reachable_floor
 from galley.names import name_fix
 from galley.study.written.factors import Condition, levels_of
-from galley.study.written.items import Comparison as ComparisonItem
-from galley.study.written.items import LongText, MultipleChoice, Ranking, ShortText, SingleChoice
 from galley.study.written.questionnaire import Questionnaire
 from galley.study.written.stages import (
     ALONE,
@@ -123,7 +121,7 @@ def _at(loaded: Loaded[StudyFile], place: int, n: int) -> tuple[int, ...]:
 
 
 def _use_faults(name: str, questionnaire: Questionnaire, stage: object) -> Iterator[tuple[str, str]]:
-    compares = any(isinstance(item, ComparisonItem) for item in questionnaire.items)
+    compares = any(item.compares for item in questionnaire.items)
     if compares and not isinstance(stage, Comparison):
         kind = getattr(stage, "kind", "")
         told = f"questionnaire '{name}' compares two partners, but a {kind} stage shows none"
@@ -149,14 +147,12 @@ def _condition_faults(
         if item is None:
             yield "item", f"stage '{stage}' asks for no item '{name}'", name_fix(name, items)
             continue
-        options = []
-        if isinstance(item, (SingleChoice, MultipleChoice)):
-            options = [option.value for option in item.options]
+        options = item.choosable
         for key in ("any_of", "none_of"):
             for value in getattr(condition, key):
                 if options and value not in options:
                     yield key, f"'{value}' is no option of '{name}'", f"use one of {' '.join(options)}"
         compares = condition.at_least is not None or condition.at_most is not None
-        if compares and isinstance(item, (SingleChoice, MultipleChoice, Ranking, ShortText, LongText)):
+        if compares and not item.numeric:
             key = "at_most" if condition.at_least is None else "at_least"
             yield key, f"the answer to '{name}' is no number", "use any_of or none_of"

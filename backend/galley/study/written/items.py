@@ -1,56 +1,36 @@
-"""The kinds of questions that a questionnaire may ask, as its file describes them."""
+"""The kinds of questions that a questionnaire may ask: what their files say, and what their answers mean.
+
+A kind is one class here and one macro of `_items.html`. Its docstring and `stored` are its entry in
+docs/study-files.md; `simulate` fills in whatever fields it draws.
+"""
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Self
+import math
+import re
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Final, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
-from galley.files.reading import FileModel, Loc, faults
+from galley.files.reading import Loc, faults
+from galley.study.written.item_base import Answer, BaseItem, Option, Say, cleaned, plain, turned_round
 from galley.study.written.languages import Text, Words
+from galley.translations import mark
 
-RESERVED_IDS = ("step",)
-"""Names of form fields that the pages need themselves."""
-
-ItemId = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=40)]
-
-
-class When(FileModel):
-    """The item is asked only if the earlier choice `item` was answered with one of `any_of`."""
-
-    item: str
-    """The id of a single or multiple choice item above this one."""
-    any_of: tuple[str, ...] = Field(min_length=1)
-    """Values of its options; one of them has to be chosen."""
+_WHOLE: Final = re.compile(r"[+-]?\d{1,15}")
+_DECIMAL: Final = re.compile(r"[+-]?\d{1,15}([.,]\d{1,15})?")
+STEP_TOLERANCE: Final = 1e-6
+"""How far, in steps, a slider's value may lie beside a step: what decimal fractions lose."""
 
 
-class Option(FileModel):
-    """One answer to choose: the value that is stored and the words that are shown."""
+class _Scale(BaseItem):
+    drawn_as = "scale"
+    stored = "1 to `scale`"
+    radio_group = True
+    numeric = True
+    missing = mark("Please choose a point on the scale.")
 
-    value: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=40)]
-    """What is stored: lower-case letters, digits, - and _."""
-    label: Text
-    """What is shown."""
-
-
-class _Item(FileModel):
-    id: ItemId
-    """Names the answer in the exports: lower-case letters, digits and _."""
-    text: Text
-    """The question or statement."""
-    help: Words = ""
-    """A line below it, in smaller type."""
-    required: bool = True
-    """Whether it has to be answered."""
-    when: When | None = None
-    """Asks it only after a certain answer to an earlier choice item."""
-    hint: Words = ""
-    """Shown beside it when a quiz is answered wrongly."""
-    subscale: Annotated[str, Field(pattern=r"^[a-z0-9_-]*$", max_length=40)] = ""
-    """The name under which answers to several items are averaged."""
-
-
-class _Scale(_Item):
     scale: int = Field(7, ge=2, le=101)
     """How many points the scale has."""
     low_label: Text
@@ -67,8 +47,20 @@ class _Scale(_Item):
             raise faults([(("labels",), told, f"write {self.scale} labels, or none")])
         return self
 
+    def answer(self, given: Sequence[str], say: Say) -> int:
+        """The point, 1 at the low end."""
+        if given[0] not in map(str, range(1, self.scale + 1)):
+            raise ValueError(say("Please choose a point from 1 to {most}.").format(most=self.scale))
+        return int(given[0])
+
+    def label_of(self, answer: Answer) -> str | None:
+        """The words at a point, where every point has words."""
+        return self.labels[answer - 1] if self.labels and isinstance(answer, int) else None
+
 
 class _Rating(_Scale):
+    scores = True
+
     reversed: bool = False
     """Whether a high point counts as low in its subscale."""
     expected: int | None = None
@@ -79,6 +71,10 @@ class _Rating(_Scale):
         if self.expected is not None and not 1 <= self.expected <= self.scale:
             raise faults([(("expected",), f"{self.expected} is not on the scale", f"use 1 to {self.scale}")])
         return self
+
+    def scored(self, answer: Answer) -> float | None:
+        """The point, counted from the other end if the item is reversed."""
+        return turned_round(answer, 1, self.scale, reversed_=self.reversed)
 
 
 class Likert(_Rating):
@@ -98,10 +94,22 @@ class SemanticDifferential(_Rating):
 class Comparison(_Scale):
     """Preference between two partners, from 1 (strongly the first) to `scale` (strongly the second)."""
 
+    compares = True
+    stored = (
+        "1 (strongly the first partner) to `scale` (strongly the second), and the signed preference, "
+        "from below 0 for the first to above 0 for the second"
+    )
+
     kind: Literal["comparison"]
 
+    def preference(self, answer: Answer) -> float | None:
+        """Points from the middle of the scale: -3 to 3 for a scale of 7; 0 is no preference."""
+        return answer - (self.scale + 1) / 2 if isinstance(answer, (int, float)) else None
 
-class _Choice(_Item):
+
+class _Choice(BaseItem):
+    drawn_as = "choices"
+
     options: tuple[Option, ...] = Field(min_length=2, max_length=50)
     """The answers to choose from."""
 
@@ -117,16 +125,36 @@ class _Choice(_Item):
             raise faults(twice)
         return self
 
+    @property
+    def values(self) -> tuple[str, ...]:
+        """What may be stored of each option, in the order of the file."""
+        return tuple(option.value for option in self.options)
+
+    def label_of(self, answer: Answer) -> str | None:
+        """The words of the chosen options."""
+        if answer is None:
+            return None
+        words = {option.value: option.label for option in self.options}
+        chosen = answer if isinstance(answer, list) else [answer]
+        return " | ".join(words.get(str(one), str(one)) for one in chosen)
+
     def _must_be_options(self, expected: tuple[str, ...]) -> None:
-        values = [option.value for option in self.options]
-        wrong = [value for value in expected if value not in values]
+        wrong = [value for value in expected if value not in self.values]
         if wrong:
-            fix = f"use one of {' '.join(values)}"
+            fix = f"use one of {' '.join(self.values)}"
             raise faults([(("expected",), f"'{value}' is no option", fix) for value in wrong])
+
+    def _only_options(self, given: Sequence[str], say: Say) -> None:
+        if any(value not in self.values for value in given):
+            raise ValueError(say("Please choose from the answers shown."))
 
 
 class SingleChoice(_Choice):
     """Exactly one of several options; `expected` makes it an attention check."""
+
+    stored = "the value of the option"
+    radio_group = True
+    missing = mark("Please choose one answer.")
 
     kind: Literal["single_choice"]
     expected: str | None = None
@@ -137,9 +165,23 @@ class SingleChoice(_Choice):
         self._must_be_options(() if self.expected is None else (self.expected,))
         return self
 
+    @property
+    def choosable(self) -> tuple[str, ...]:
+        """The options."""
+        return self.values
+
+    def answer(self, given: Sequence[str], say: Say) -> str:
+        """The option's value."""
+        self._only_options(given, say)
+        return given[0]
+
 
 class MultipleChoice(_Choice):
     """Any number of several options, at least one if required; `expected` are exactly those to choose."""
+
+    stored = "a list of values"
+    many_values = True
+    missing = mark("Please choose at least one answer.")
 
     kind: Literal["multiple_choice"]
     expected: tuple[str, ...] | None = Field(None, min_length=1)
@@ -150,16 +192,58 @@ class MultipleChoice(_Choice):
         self._must_be_options(self.expected or ())
         return self
 
+    @property
+    def choosable(self) -> tuple[str, ...]:
+        """The options."""
+        return self.values
+
+    def answer(self, given: Sequence[str], say: Say) -> list[str]:
+        """The options' values in the order of the file."""
+        self._only_options(given, say)
+        return [value for value in self.values if value in given]
+
 
 class Ranking(_Choice):
     """All options in an order, the best first; every one gets a place."""
+
+    drawn_as = "ranking"
+    stored = "the values of all options, first place first"
+    many_values = True
+    missing = mark("Please give every answer a place.")
 
     kind: Literal["ranking"]
     options: tuple[Option, ...] = Field(min_length=2, max_length=20)
     """What is put in order."""
 
+    def field(self, value: str) -> str:
+        """The form field that holds the place of one option, 1 for the first."""
+        return f"{self.id}.{value}"
 
-class _Amount(_Item):
+    def given(self, form: Mapping[str, Sequence[str]]) -> list[str]:
+        """The place of every option, blank where there is none or more than one."""
+        fields = [form.get(self.field(value), ()) for value in self.values]
+        return [cleaned(places[0]) if len(places) == 1 else "" for places in fields]
+
+    def answer(self, given: Sequence[str], say: Say) -> list[str]:
+        """The options' values, the first place first."""
+        places = [str(place) for place in range(1, len(self.options) + 1)]
+        if "" in given:
+            raise ValueError(say(self.missing))
+        if sorted(given) != sorted(places):
+            raise ValueError(say("Please give each place from 1 to {most} once.").format(most=len(places)))
+        ranked = dict(zip(given, self.values, strict=True))
+        return [ranked[place] for place in places]
+
+    def as_sent(self, answer: Answer) -> dict[str, list[str]]:
+        """A field for each option with its place."""
+        ranked = answer if isinstance(answer, list) else []
+        return {self.field(value): [str(place)] for place, value in enumerate(ranked, 1)}
+
+
+class _Amount(BaseItem):
+    stored = "the number"
+    numeric = True
+
     min: float
     """The smallest answer."""
     max: float
@@ -172,24 +256,55 @@ class _Amount(_Item):
     @model_validator(mode="after")
     def _range_is_not_empty(self) -> Self:
         if self.min > self.max:
-            told = f"'min' {self.min:g} is above 'max' {self.max:g}"
+            told = f"'min' {self.least} is above 'max' {self.most}"
             raise faults([(("min",), told, "exchange them")])
         if self.expected is not None and not self.min <= self.expected <= self.max:
-            told = f"{self.expected:g} is out of range"
-            raise faults([(("expected",), told, f"use {self.min:g} to {self.max:g}")])
+            told = f"{plain(self.expected)} is out of range"
+            raise faults([(("expected",), told, f"use {self.least} to {self.most}")])
         return self
+
+    @property
+    def least(self) -> str:
+        """`min` as it is shown."""
+        return plain(self.min)
+
+    @property
+    def most(self) -> str:
+        """`max` as it is shown."""
+        return plain(self.max)
 
 
 class Number(_Amount):
     """A number between `min` and `max`, both allowed; a whole one unless `whole: false`."""
 
+    drawn_as = "number"
+    missing = mark("Please enter a number.")
+
     kind: Literal["number"]
     whole: bool = True
     """Whether only whole numbers are answers."""
 
+    def answer(self, given: Sequence[str], say: Say) -> int | float:
+        """The number; a comma may stand for the decimal point."""
+        text = given[0]
+        if not (_WHOLE if self.whole else _DECIMAL).fullmatch(text):
+            raise ValueError(say("Please enter a whole number.") if self.whole else say(self.missing))
+        value = int(text) if self.whole else float(text.replace(",", "."))
+        if not self.min <= value <= self.max or not math.isfinite(value):
+            told = say("Please enter a number from {least} to {most}.")
+            raise ValueError(told.format(least=self.least, most=self.most))
+        return value
+
 
 class Slider(_Amount):
-    """A place on a line from `min` to `max` in steps of `step`; no answer until it is touched."""
+    """A place on a line from `min` to `max` in steps of `step`.
+
+    A slider has no answer until it is touched: an untouched one is refused, never stored as a value.
+    """
+
+    drawn_as = "slider"
+    scores = True
+    missing = mark("Please choose a point on the line.")
 
     kind: Literal["slider"]
     min: float = 0
@@ -211,21 +326,64 @@ class Slider(_Amount):
     def _steps_fill_the_line(self) -> Self:
         steps = (self.max - self.min) / self.step
         if steps < 1 or abs(steps - round(steps)) > 1e-9:
-            told = f"steps of {self.step:g} do not lead from {self.min:g} to {self.max:g}"
+            told = f"steps of {self.pace} do not lead from {self.least} to {self.most}"
             raise faults([(("step",), told, "choose a step that divides the line")])
         return self
 
+    @property
+    def pace(self) -> str:
+        """`step` as it is shown."""
+        return plain(self.step)
 
-class ShortText(_Item):
+    def answer(self, given: Sequence[str], say: Say) -> int | float:
+        """The number at the point."""
+        told = say("Please choose a point from {least} to {most}.").format(least=self.least, most=self.most)
+        if not _DECIMAL.fullmatch(given[0]):
+            raise ValueError(told)
+        value = float(given[0].replace(",", "."))
+        steps = (value - self.min) / self.step
+        if not self.min <= value <= self.max or abs(steps - round(steps)) > STEP_TOLERANCE:
+            raise ValueError(told)
+        return int(value) if value.is_integer() else value
+
+    def scored(self, answer: Answer) -> float | None:
+        """The number, counted from the other end if the item is reversed."""
+        return turned_round(answer, self.min, self.max, reversed_=self.reversed)
+
+
+class _Words(BaseItem):
+    stored = "the text"
+    max_length: int
+
+    def answer(self, given: Sequence[str], say: Say) -> str:
+        """The text."""
+        text = self._laid_out(given[0])
+        if len(text) > self.max_length:
+            told = say("Please shorten this to {most} characters; it has {now} now.")
+            raise ValueError(told.format(most=self.max_length, now=len(text)))
+        return text
+
+    def _laid_out(self, text: str) -> str:
+        return text
+
+
+class ShortText(_Words):
     """One line of text."""
+
+    drawn_as = "line"
 
     kind: Literal["short_text"]
     max_length: int = Field(200, ge=1, le=1000)
     """The most characters."""
 
+    def _laid_out(self, text: str) -> str:
+        return " ".join(text.splitlines())
 
-class LongText(_Item):
+
+class LongText(_Words):
     """Several lines of text."""
+
+    drawn_as = "lines"
 
     kind: Literal["long_text"]
     max_length: int = Field(5000, ge=1, le=20000)
@@ -246,37 +404,12 @@ Item = Annotated[
     Field(discriminator="kind"),
 ]
 
+_ANY_ITEM: Final[TypeAdapter[Item]] = TypeAdapter(Item)
 
-def item_faults(items: tuple[Any, ...]) -> list[tuple[Loc, str, str]]:
-    """What is wrong between the items of one file: ids that stand twice, conditions on what was not asked."""
-    found: list[tuple[Loc, str, str]] = []
-    choices: dict[str, list[str]] = {}
-    seen: set[str] = set()
-    for place, item in enumerate(items):
-        if item.id in seen:
-            found.append(((place, "id"), f"item id '{item.id}' stands twice", "give each item its own id"))
-        if item.id in RESERVED_IDS:
-            found.append(((place, "id"), f"item id '{item.id}' is taken by the page", "choose another id"))
-        if item.when is not None:
-            values = choices.get(item.when.item)
-            if values is None:
-                told = f"'when' asks for '{item.when.item}', which is no choice item above this one"
-                known = " ".join(choices) or "single_choice items that stand above"
-                found.append(((place, "when", "item"), told, f"use one of {known}"))
-            else:
-                found += [
-                    (
-                        (place, "when", "any_of", n),
-                        f"'{value}' is no option of '{item.when.item}'",
-                        f"use one of {' '.join(values)}",
-                    )
-                    for n, value in enumerate(item.when.any_of)
-                    if value not in values
-                ]
-        if isinstance(item, (SingleChoice, MultipleChoice)):
-            choices[item.id] = [option.value for option in item.options]
-        if getattr(item, "expected", None) is not None and not item.required:
-            told = f"item '{item.id}' has an expected answer but need not be answered"
-            found.append(((place, "required"), told, "remove `required: false`, or the expected answer"))
-        seen.add(item.id)
-    return found
+
+def stored_item(shown: Mapping[str, Any] | None) -> Item | None:
+    """The item that was shown, from its stored fields; None if they are unknown or of a kind that is gone."""
+    try:
+        return None if shown is None else _ANY_ITEM.validate_python(shown)
+    except ValidationError:
+        return None
