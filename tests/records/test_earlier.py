@@ -27,7 +27,10 @@ from tests.records.earlier import lived
 from tests.records.earlier.lived import FrontDoor, Office, Person
 
 BEFORE = lived.HERE / "c05f99f"
-ADDED: Mapping[str, frozenset[str]] = {}
+ADDED: Mapping[str, frozenset[str]] = {
+    "responses": frozenset({"subscale", "subscale_value"}),
+    "wide": frozenset({"about.subscale.mood", "load.subscale.workload"}),
+}
 """Columns, by sheet, that exports have gained since; all others stand as they stood, in their order."""
 
 CLOCK = {"begun_utc", "ended_utc", "last_seen_utc", "entered_utc", "left_utc", "answered_utc", "started_utc"}

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import csv
+import json
 import shutil
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -22,11 +25,14 @@ from galley.records.database import migrate
 from galley.records.database.engine import connect, database_url
 from galley.records.database.tables import METADATA
 from galley.records.export.study_export import export_study
+from galley.records.reading.flags import flags
 from galley.records.reading.verify import verify_study
+from galley.study.visit.plan import Step
 from tests.postgres import Postgres
 from tests.records import databases
 from tests.records.databases import Database
-from tests.records.helpers import begin, one_soup, open_round, play
+from tests.records.helpers import begin, one_soup, open_round, plan, play
+from tests.study.written.test_questionnaire import made
 
 # As the first revision wrote it; never to be changed. Made by `sqlite3 galley.sqlite .dump`.
 FIRST = Path(__file__).with_name("first_revision.sql")
@@ -166,6 +172,56 @@ def test_a_database_of_the_first_revision_is_brought_forward_with_its_data(
     assert old.rows("SELECT state FROM studies") == [("open",)]
     assert ("rounds-1", "") in old.rows("SELECT step_id, item FROM questions")
     assert old.rows("SELECT count(*) FROM visits WHERE last_seen_ms = 0") == [(0,)]
+
+
+TWO = [{"value": value, "label": value} for value in ("a", "c")]
+SCALE = {"kind": "likert", "low_label": "low", "high_label": "high"}
+ASKED = made(
+    {"kind": "multiple_choice", "options": TWO, "expected": ["c", "a"]},
+    {"kind": "single_choice", "options": TWO, "expected": "c"},
+    {**SCALE, "subscale": "trust"},
+    {**SCALE, "subscale": "trust", "reversed": True},
+)
+
+
+def test_right_answers_that_were_kept_as_wrong_are_mended(empty: Database, tmp_path: Path) -> None:
+    expected = dict(ASKED.expected)
+    steps = [step if step.id != "debrief" else quiz(expected) for step in plan().steps]
+    with Store.open(empty.url) as store:
+        visit = begin(store)
+        answers = {"q0": ["a", "c"], "q1": "a", "q2": 6, "q3": 2}
+        for at, step in enumerate(("rounds-1-questions", "comparison"), 1):
+            saved = store.save_answers(visit.id, step, answers, at, "active", 1, questionnaire=ASKED)
+            assert saved.result()
+        store.save_attempt(visit.id, "debrief", 1, answers, 2, ASKED).result()
+    as_before = [
+        "UPDATE responses SET passed = false WHERE item = 'q0' AND step_id = 'comparison'",
+        'UPDATE attempts SET wrong = \'["q0", "q1"]\'',
+        "DELETE FROM questions WHERE item LIKE 'subscale.%'",
+        "UPDATE alembic_version SET version_num = '0004'",
+    ]
+    engine = connect(database_url(empty.url), writes=True)
+    with engine.begin() as connection:
+        for change in as_before:
+            connection.execute(text(change))
+        written = json.dumps({**json.loads(plan().to_json()), "steps": [asdict(step) for step in steps]})
+        connection.execute(text("UPDATE visits SET plan_json = :plan"), {"plan": written})
+    engine.dispose()
+    with Store.open(empty.url) as store:
+        with store.reading() as connection:
+            assert [flag.words for flag in flags(connection, "demo")[visit.id]] == ["2 checks failed"]
+        export_study(store, "demo", tmp_path / "out")
+    passed = empty.rows("SELECT item, passed FROM responses ORDER BY step_id, item")
+    assert passed == [("q0", True), ("q1", False), ("q2", None), ("q3", None)] * 2
+    assert empty.rows("SELECT wrong FROM attempts") == [('["q1"]',)]
+    with (tmp_path / "out" / "wide.csv").open(encoding="utf-8", newline="") as file:
+        (row,) = csv.DictReader(file)
+    assert (row["rounds-1-questions.subscale.trust"], row["comparison.subscale.trust"]) == ("6", "6")
+
+
+def quiz(expected: dict[str, Any]) -> Step:
+    """A quiz as a plan held it."""
+    return Step("debrief", "quiz", "Quiz", {"questionnaire": "quiz", "expected": expected, "tries": 2})
 
 
 def test_a_migration_keeps_the_data_and_what_points_at_it(empty: Database, scripts: Path) -> None:

@@ -88,6 +88,42 @@ def some(row: dict[str, str], **expected: str) -> bool:
     return True
 
 
+SUBSCALES = (
+    {"id": "load", "kind": "slider", "text": "Hard?", "step": 5, "low_label": "l", "high_label": "h"},
+    {"id": "ease", "kind": "slider", "text": "Easy?", "step": 5, "low_label": "l", "high_label": "h"},
+    {"id": "sure", "kind": "likert", "text": "Sure?", "required": False, "subscale": "trust", **SCALE},
+    {"id": "open", "kind": "short_text", "text": "Else?", "subscale": "trust", "required": False},
+)
+WORKLOAD = (
+    {**SUBSCALES[0], "subscale": "workload"},
+    {**SUBSCALES[1], "subscale": "workload", "reversed": True},
+)
+
+
+def test_subscales(store: Store, tmp_path: Path) -> None:
+    visit = begin(store)
+    play(store, open_round(store, visit, "rounds-1"), one_soup())
+    answers = {"load": 80, "ease": 25, "sure": None, "open": None}
+    answer(store, visit, "rounds-1-questions", (*WORKLOAD, *SUBSCALES[2:]), answers, 20_000)
+    whole_visit(store)
+    found = exported(store, tmp_path / "out")
+    assert [(row["item"], row["subscale"], row["subscale_value"]) for row in found["responses"]][:4] == [
+        ("load", "workload", "80"),
+        ("ease", "workload", "75"),
+        ("sure", "trust", ""),
+        ("open", "", ""),
+    ]
+    workload, trust = found["subscales"]
+    about = {"step": "rounds-1-questions", "questionnaire": "after", "round_no": "1", "agent": "chef-a"}
+    assert some(workload, **about, subscale="workload", items="2", answered="2", mean="77.5")
+    assert some(trust, **about, subscale="trust", items="1", answered="0", mean="")
+    first, second = found["wide"]
+    names = [f"rounds-1-questions.subscale.{name}" for name in ("trust", "workload")]
+    assert list(first)[-2:] == names, "at the end: all other columns stay where they were"
+    assert [first[name] for name in names] == ["", "77.5"]
+    assert [second[name] for name in names] == ["", ""]
+
+
 def test_participants(store: Store, tmp_path: Path) -> None:
     visit, other = whole_visit(store), begin(store)
     first, second = exported(store, tmp_path / "out")["participants"]

@@ -213,9 +213,14 @@ QUESTIONS = Table(
     METADATA,
     _of("study", String(200), "name of the study", ForeignKey("studies.name"), primary_key=True),
     _of("step_id", String(200), "the step; empty for a factor of the design", primary_key=True),
-    _of("item", String(200), "the item, or the factor; empty for a round", primary_key=True),
+    _of(
+        "item",
+        String(200),
+        "the item, or the factor, or subscale.NAME; empty for a round",
+        primary_key=True,
+    ),
     _of("place", Integer, "place of the step in the first plan that came to it"),
-    _of("position", Integer, "place of the item on its page, from 1"),
+    _of("position", Integer, "place of the item on its page, from 1; 1000 for a subscale"),
     info={
         "meaning": "one row per column of the wide export: what anybody was asked, whose answers or not, so "
         "that erasing a person leaves the columns of all others as they are"

@@ -71,6 +71,12 @@ _STEP: Final = (
     Field("step_index", "whole number", "place of the step in the visit's plan, from 0"),
     Field("step", "text", "the step of the visit's plan"),
 )
+_ABOUT: Final = (
+    Field("round_no", "whole number", "the round that was asked about; empty if none was"),
+    Field("layout", "text", "the layout of that round"),
+    Field("agent", "text", "the agent of that round"),
+    Field("partner_hat", "text", "colour of that agent's hat"),
+)
 
 
 def _chef(name: str) -> Iterator[Field]:
@@ -286,10 +292,7 @@ RESPONSES_SHEET: Final = Sheet(
         Field("label", "text", "the chosen option, or several, in the words that were shown"),
         _as_in(RESPONSES.c.passed, "true/false"),
         Field("answered_utc", "time", str(RESPONSES.c.at_ms.doc)),
-        Field("round_no", "whole number", "the round that was asked about; empty if none was"),
-        Field("layout", "text", "the layout of that round"),
-        Field("agent", "text", "the agent of that round"),
-        Field("partner_hat", "text", "colour of that agent's hat"),
+        *_ABOUT,
         Field("first_agent", "text", "comparison: the agent at the low end of the scale"),
         Field("first_hat", "text", "comparison: colour of its hat"),
         Field("second_agent", "text", "comparison: the agent at the high end of the scale"),
@@ -300,6 +303,29 @@ RESPONSES_SHEET: Final = Sheet(
             "comparison: points from the scale's middle; negative: the first agent, positive: the second",
         ),
         Field("preferred_agent", "text", "comparison: the agent preferred; empty at the middle"),
+        Field("subscale", "text", "the subscale that the answer counts in; empty if it counts in none"),
+        Field(
+            "subscale_value",
+            "number",
+            "what the answer counts there: its value, turned round where the item is reversed",
+        ),
+    ),
+)
+
+SUBSCALES_SHEET: Final = Sheet(
+    "subscales",
+    "One row per subscale of a submitted questionnaire; of NASA-TLX, workload is the Raw TLX.",
+    "visit_no, step_index, first item",
+    (
+        *_WHO,
+        _CONDITION,
+        *_STEP,
+        Field("questionnaire", "text", "name of the questionnaire"),
+        Field("subscale", "text", "name of the subscale"),
+        Field("items", "whole number", "items of the subscale"),
+        Field("answered", "whole number", "those of them that were answered"),
+        Field("mean", "number", "mean of the items' subscale_value; empty unless all of them were answered"),
+        *_ABOUT,
     ),
 )
 
@@ -383,6 +409,7 @@ WIDE: Final = Sheet(
         Field("condition.FACTOR", "text", "level of a factor that varies between participants"),
         Field("STEP.ITEM", "text", "the answer to an item; several options are separated by ' | '"),
         *(Field(f"STEP.{field.name}", field.kind, f"round: {field.meaning}") for field in ROUND_COLUMNS),
+        Field("STEP.subscale.NAME", "number", "mean of a subscale, as in subscales.csv"),
     ),
 )
 
@@ -400,4 +427,5 @@ SHEETS: Final = (
     ATTEMPTS_SHEET,
     ABSENCES_SHEET,
     NOTES_SHEET,
+    SUBSCALES_SHEET,
 )

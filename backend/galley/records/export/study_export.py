@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, Final
 
@@ -20,6 +22,7 @@ from galley.records.export.columns import (
     RESPONSES_SHEET,
     SHEETS,
     STAGES_SHEET,
+    SUBSCALES_SHEET,
     WIDE,
 )
 from galley.records.export.csv_file import CsvFile
@@ -33,7 +36,9 @@ from galley.records.reading.flags import Flag, flags
 from galley.records.rows import RoundRow, VisitRow
 from galley.records.store import queries
 from galley.records.store.store import Store
+from galley.study.scores import subscale_scores
 from galley.study.visit.plan import Plan, Step
+from galley.study.written.items import Item, stored_item
 
 FORMATS: Final[dict[str, type[PartFile]]] = {
     "csv": CsvFile,
@@ -128,16 +133,16 @@ class _Visit:
                 self._round(row, step)
         self._participant(statuses)
         self._stages()
-        self._responses()
+        means = self._responses()
         self._small_sheets()
         who = {**self.who, "status": self.visit.status, "language": self.visit.language}
         duration_s = _seconds(self.visit.created_ms, self.visit.ended_ms)
-        self.files[WIDE.name].write({**who, "duration_s": duration_s, **self._wide()})
+        self.files[WIDE.name].write({**who, "duration_s": duration_s, **self._wide(means)})
 
-    def _wide(self) -> dict[str, Any]:
+    def _wide(self, means: Mapping[str, Mapping[str, float | None]]) -> dict[str, Any]:
         answers = queries.answers(self.connection, self.visit.id)
         told = {step: {item: _joined(value) for item, value in of.items()} for step, of in answers.items()}
-        return self.wide.row(self.visit, told, self.rounds)
+        return self.wide.row(self.visit, told, self.rounds, means)
 
     def _small_sheets(self) -> None:
         for sheet, table in ((ATTEMPTS_SHEET, ATTEMPTS), (ABSENCES_SHEET, ABSENCES), (NOTES_SHEET, NOTES)):
@@ -211,31 +216,38 @@ class _Visit:
                 }
             )
 
-    def _responses(self) -> None:
+    def _responses(self) -> dict[str, dict[str, float | None]]:
+        """For each step with subscales their means, after writing every answer."""
         query = select(RESPONSES).where(RESPONSES.c.visit_id == self.visit.id)
         rows = self.connection.execute(query).mappings().all()
-        for row in sorted(rows, key=lambda row: (self.places[row["step_id"]], row["position"])):
-            step = self._step(row["step_id"])
-            shown = row["shown"] or {}
-            self.files[RESPONSES_SHEET.name].write(
-                {
-                    **self.who,
-                    "step_index": self.places[step.id],
-                    "step": step.id,
-                    "questionnaire": step.data.get("questionnaire"),
-                    "position": row["position"],
-                    "item": row["item"],
-                    **{
-                        name: shown.get(name) for name in ("kind", "text", "scale", "low_label", "high_label")
-                    },
-                    "value": _joined(row["value"]),
-                    "label": _label(row["value"], shown),
-                    "passed": row["passed"],
-                    "answered_utc": row["at_ms"],
-                    **self._asked_about(step),
-                    **_compared(step, row["value"], shown),
-                }
-            )
+        means = {}
+        by_place = sorted(map(dict, rows), key=lambda row: (self.places[row["step_id"]], row["position"]))
+        for step_id, given in groupby(by_place, key=itemgetter("step_id")):
+            step, answers = self._step(step_id), list(given)
+            of_step = {
+                **self.who,
+                "step_index": self.places[step.id],
+                "step": step.id,
+                "questionnaire": step.data.get("questionnaire"),
+                **self._asked_about(step),
+            }
+            items = [stored_item(row["shown"]) for row in answers]
+            for row, item in zip(answers, items, strict=True):
+                self.files[RESPONSES_SHEET.name].write({**of_step, **_response(step, row, item)})
+            means[step.id] = self._subscales(of_step, items, {row["item"]: row["value"] for row in answers})
+        return means
+
+    def _subscales(
+        self, of_step: Mapping[str, Any], items: Sequence[Item | None], answers: Mapping[str, Any]
+    ) -> dict[str, float | None]:
+        known = [item for item in items if item is not None]
+        means = subscale_scores(known, answers)
+        for name, mean in means.items():
+            scored = [item.scored(answers.get(item.id)) for item in known if item.part == name]
+            answered = sum(value is not None for value in scored)
+            row = {"subscale": name, "items": len(scored), "answered": answered, "mean": mean}
+            self.files[SUBSCALES_SHEET.name].write({**of_step, **row})
+        return means
 
     def _asked_about(self, step: Step) -> dict[str, Any]:
         """The round that a questionnaire follows; a comparison and a survey are about no single round."""
@@ -251,33 +263,33 @@ class _Visit:
         return about
 
 
-def _compared(step: Step, value: Any, shown: Mapping[str, Any]) -> dict[str, Any]:
+def _response(step: Step, row: Mapping[str, Any], item: Item | None) -> dict[str, Any]:
+    """What is told about one answer; little where the item that was shown is unknown."""
+    shown, value = row["shown"] or {}, row["value"]
     sides: dict[str, Any] = {
         f"{side}_{what}": step.data.get(side, {}).get(what)
         for side in ("first", "second")
         for what in ("agent", "hat")
     }
-    preference = preferred = None
-    if shown.get("kind") == "comparison" and value is not None:
-        preference = value - (shown["scale"] + 1) / 2
-        side = "first" if preference < 0 else "second"
-        preferred = sides[f"{side}_agent"] if preference else None
-    return {**sides, "preference": preference, "preferred_agent": preferred}
+    preference = None if item is None else item.preference(value)
+    return {
+        "position": row["position"],
+        "item": row["item"],
+        **{name: shown.get(name) for name in ("kind", "text", "scale", "low_label", "high_label")},
+        "value": _joined(value),
+        "label": None if item is None else item.label_of(value),
+        "passed": row["passed"],
+        "answered_utc": row["at_ms"],
+        **sides,
+        "preference": preference,
+        "preferred_agent": sides["first_agent" if preference < 0 else "second_agent"] if preference else None,
+        "subscale": None if item is None else item.part or None,
+        "subscale_value": None if item is None or not item.part else item.scored(value),
+    }
 
 
 def _joined(value: Any) -> Any:
     return " | ".join(map(str, value)) if isinstance(value, list) else value
-
-
-def _label(value: Any, shown: Mapping[str, Any]) -> str | None:
-    """The words that were shown for a chosen option or a labelled point of a scale."""
-    if value is None:
-        return None
-    if shown.get("labels"):
-        return str(shown["labels"][value - 1])
-    words = {option["value"]: option["label"] for option in shown.get("options", ())}
-    chosen = value if isinstance(value, list) else [value]
-    return " | ".join(words.get(one, str(one)) for one in chosen) if words else None
 
 
 def _seconds(start_ms: int, end_ms: int | None) -> float | None:

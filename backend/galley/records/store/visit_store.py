@@ -104,9 +104,19 @@ class VisitStore(StoreBase):
             }
             for position, (item, value) in enumerate(answers.items(), 1)
         ]
+        items = () if questionnaire is None else questionnaire.items
+        parts = tuple(dict.fromkeys(item.part for item in items if item.part))
         code = completion_code
         left = visit_writes.LeftStep(
-            visit_id, step_id, rows, new_step_index, _status(status), round(at_ms), code, consent_sha256
+            visit_id,
+            step_id,
+            rows,
+            new_step_index,
+            _status(status),
+            round(at_ms),
+            code,
+            consent_sha256,
+            parts,
         )
         return self.write(lambda connection: visit_writes.leave_step(connection, left))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 from sqlalchemy import Connection, Table, func, insert, select, update
 
@@ -33,6 +33,19 @@ NEW_VISIT: dict[str, Any] = {
     "language": "en",
     "tries": 0,
 }
+SUBSCALE: Final = "subscale."
+"""Begins the name of a subscale among the questions; no item's name has a dot."""
+AFTER_ALL_ITEMS: Final = 1000
+
+
+def question_of(subscale: str) -> str:
+    """The name under which a subscale stands among the questions."""
+    return f"{SUBSCALE}{subscale}"
+
+
+def subscale_of(question: str) -> str:
+    """The subscale with this name among the questions; empty for an item, a round or a factor."""
+    return question.removeprefix(SUBSCALE) if question.startswith(SUBSCALE) else ""
 
 
 def next_visit_no(connection: Connection, study: str) -> int:
@@ -99,6 +112,7 @@ class LeftStep:
     at_ms: int
     completion_code: str | None
     consent_sha256: str | None
+    subscales: Sequence[str] = ()
 
 
 def leave_step(connection: Connection, left: LeftStep) -> bool:
@@ -122,6 +136,7 @@ def leave_step(connection: Connection, left: LeftStep) -> bool:
         here_and_now = {"visit_id": left.visit_id, "step_id": left.step_id, "at_ms": left.at_ms}
         connection.execute(insert(RESPONSES), [{**answer, **here_and_now} for answer in left.answers])
         asked = [(answer["item"], answer["position"]) for answer in left.answers]
+        asked += [(question_of(name), AFTER_ALL_ITEMS) for name in left.subscales]
         keep_questions(connection, visit, left.step_id, asked)
     changes: dict[str, Any] = {"step_index": left.new_step_index, "tries": 0}
     if left.consent_sha256 is not None:
