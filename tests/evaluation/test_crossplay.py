@@ -16,15 +16,15 @@ from galley.agents.episode import play_episodes
 from galley.cli import app
 from galley.errors import GalleyError
 from galley.evaluation import crossplay
+from galley.evaluation.agent_groups import AgentGroup
 from galley.evaluation.crossplay import Roster, find_layouts, game_seeds, pairings, play_cells
-from galley.evaluation.entries import Entry
-from galley.evaluation.results import Figure, Results
+from galley.evaluation.game_scores import GameScores, MeanScore
 from galley.kitchen.layout_file import find_layout
 from galley.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[2]
 RING = "coordination_ring"
-A, B, P = (Entry(name, (name,)) for name in "abp")
+A, B, P = (AgentGroup(name, (name,)) for name in "abp")
 
 
 @pytest.fixture
@@ -44,7 +44,7 @@ def evaluate(home: Path, *arguments: str) -> Result:
     return CliRunner().invoke(app, ["learn", "evaluate", "--workspace", str(home), *arguments])
 
 
-def scores(results: Results) -> dict[tuple[str, str, str], tuple[int, ...]]:
+def scores(results: GameScores) -> dict[tuple[str, str, str], tuple[int, ...]]:
     return {cell.key: cell.scores for cell in results}
 
 
@@ -53,7 +53,7 @@ def test_everyone_plays_everyone_once_in_each_seat_order() -> None:
     assert pairings([A, B], [P], itself=False) == [("a", "p"), ("p", "a"), ("b", "p"), ("p", "b")]
     assert pairings([A], [P], itself=True) == [("a", "a"), ("a", "p"), ("p", "a")]
     assert pairings([A, P], [P], itself=False) == [("a", "p"), ("p", "a"), ("p", "p")]
-    seeds = Entry("seeds", ("a", "b"))
+    seeds = AgentGroup("seeds", ("a", "b"))
     assert pairings([seeds], None, itself=False) == [("a", "a"), ("b", "b")]
     assert len(pairings([seeds], [P], itself=True)) == 6
 
@@ -76,7 +76,7 @@ def test_layouts_are_those_that_all_know(home: Path) -> None:
 def test_a_cell_is_the_same_alone_beside_others_and_on_other_processes(home: Path) -> None:
     layouts = [find_layout(Workspace(home), name) for name in ("cramped_room", RING)]
     pairs = [("human-bc", "random"), ("random", "human-bc"), ("human-bc", "human-bc")]
-    alone, many = Results(), Results()
+    alone, many = GameScores(), GameScores()
     for layout in reversed(layouts):
         for pair in pairs:
             play_cells(alone, [layout], [pair], workspace=home, games=6, seed=3)
@@ -88,7 +88,7 @@ def test_a_cell_is_the_same_alone_beside_others_and_on_other_processes(home: Pat
 
 def test_scores_are_those_of_the_bundles_and_more_games_begin_with_the_same(home: Path) -> None:
     layout = find_layout(Workspace(home), RING)
-    results = Results()
+    results = GameScores()
     play_cells(results, [layout], [("human-bc", "stay")], workspace=home, games=4, seed=1)
     clone, stay = (load_bundle(home / "agents" / name, name) for name in ("human-bc", "stay"))
     seeds = game_seeds(1, (RING, "human-bc", "stay"), 9)
@@ -102,7 +102,7 @@ def test_scores_are_those_of_the_bundles_and_more_games_begin_with_the_same(home
 
 def test_what_was_played_is_not_played_again_unless_something_changed(home: Path) -> None:
     layout = find_layout(Workspace(home), RING)
-    results = Results()
+    results = GameScores()
 
     def cells(games: int = 3, seed: int = 1) -> int:
         started: list[int] = []
@@ -140,7 +140,7 @@ def test_results_come_back_from_their_file(home: Path) -> None:
     )
     assert done.exit_code == 0, done.output
     assert "3 games for each seat order, seed 0" in done.stdout
-    results = Results.load(out)
+    results = GameScores.load(out)
     assert results.layouts == [RING]
     assert len(results) == 4
     assert all(len(cell.scores) == 3 for cell in results)
@@ -152,7 +152,7 @@ def test_results_come_back_from_their_file(home: Path) -> None:
         ("stay", "random", "3"),
         ("stay", "stay", "3"),
     ]
-    again = Results(results)
+    again = GameScores(results)
     again.save(home / "again.json")
     assert (home / "again.json").read_bytes() == out.read_bytes()
 
@@ -186,7 +186,7 @@ def test_bundles_outside_the_workspace_play_like_those_within(home: Path, tmp_pa
     folder = home / "runs" / "human-bc"
     shutil.copytree(home / "agents" / "human-bc", folder)
     layout = find_layout(Workspace(home), RING)
-    results = Results()
+    results = GameScores()
     pairs = [(str(folder), "random"), ("human-bc", "random")]
     play_cells(results, [layout], pairs, workspace=home, games=3, seed=0)
     assert results.cell(RING, str(folder), "random").scores == results.cell(RING, "human-bc", "random").scores
@@ -216,11 +216,11 @@ def test_a_file_of_something_else_is_refused_and_left_alone(home: Path) -> None:
     assert "holds no results of galley learn evaluate (cells.0.seat_0" in str(done.exception)
     assert "room" in out.read_text("utf-8")
     with pytest.raises(GalleyError, match="cannot be read"):
-        Results.load(home / "none.json")
+        GameScores.load(home / "none.json")
 
 
 def test_mean_and_standard_error() -> None:
-    result = Figure.of((0, 20, 40, 60))
+    result = MeanScore.of((0, 20, 40, 60))
     assert result.mean == 30
     assert result.standard_error == pytest.approx(np.sqrt(2000 / 3 / 4))
-    assert Figure.of([20]).standard_error == 0
+    assert MeanScore.of([20]).standard_error == 0

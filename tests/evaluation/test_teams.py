@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from galley.cli import app
 from galley.errors import GalleyError
 from galley.evaluation.many_layouts import evaluate_many
-from galley.evaluation.summary import figures, spreads
+from galley.evaluation.measure_spreads import spreads, trial_measures
 from galley.evaluation.teams import Team, evaluate, play_trials
 from galley.kitchen import Layout
 from galley.kitchen.measures import measures
@@ -24,7 +24,7 @@ SMALL = Team(epsilon=0.1, trials=6, horizon_ticks=80, seed=4, workspace=str(ROOT
 
 def test_medians_are_those_of_the_trials() -> None:
     answer = evaluate(ROOM, SMALL)
-    trials = [figures(measures(one)) for one in play_trials(ROOM, SMALL)]
+    trials = [trial_measures(measures(one)) for one in play_trials(ROOM, SMALL)]
     assert len(trials) == 6
     for name, spread in spreads(trials).items():
         assert answer["measures"][name]["median"] == spread.median
@@ -34,7 +34,7 @@ def test_medians_are_those_of_the_trials() -> None:
 
 def test_differences_are_robot_minus_human_on_either_seat() -> None:
     trial = measures(play_trials(ROOM, SMALL)[0])
-    first, second = figures(trial, 0), figures(trial, 1)
+    first, second = trial_measures(trial, 0), trial_measures(trial, 1)
     assert first["ingredients_difference"] == trial.ingredients[0] - trial.ingredients[1]
     assert first["ingredients_difference"] == -second["ingredients_difference"]
 

@@ -16,8 +16,8 @@ from galley.agents.bundle import Bundle, load_bundle
 from galley.agents.catalogue import Catalogue
 from galley.agents.episode import play_episodes
 from galley.errors import GalleyError
-from galley.evaluation.entries import Entry
-from galley.evaluation.results import Cell, Key, Results
+from galley.evaluation.agent_groups import AgentGroup
+from galley.evaluation.game_scores import Cell, GameScores, Key
 from galley.kitchen import Layout
 from galley.kitchen.layout_file import find_layout
 from galley.workers import map_tasks
@@ -59,7 +59,7 @@ class Task:
 
 
 def pairings(
-    agents: Sequence[Entry], partners: Sequence[Entry] | None, itself: bool
+    agents: Sequence[AgentGroup], partners: Sequence[AgentGroup] | None, itself: bool
 ) -> list[tuple[str, str]]:
     """Who sits on seat 0 and seat 1 of each cell, each once.
 
@@ -113,7 +113,7 @@ def find_layouts(
 
 
 def play_cells(
-    results: Results,
+    results: GameScores,
     layouts: Sequence[Layout],
     pairs: Sequence[tuple[str, str]],
     *,

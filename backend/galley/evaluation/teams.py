@@ -14,7 +14,7 @@ from galley.agents.episode import play_episode
 from galley.agents.protocol import Agent
 from galley.compiled.randomness import uniform
 from galley.errors import GalleyError
-from galley.evaluation.summary import figures, spreads
+from galley.evaluation.measure_spreads import spreads, trial_measures
 from galley.kitchen import ACTIONS, Layout
 from galley.kitchen.measures import measures
 from galley.kitchen.trajectory import Trajectory
@@ -61,7 +61,7 @@ def evaluate(layout: Layout, team: Team) -> dict[str, Any]:
     Raises:
         GalleyError: the layout cannot be served or an agent cannot play in it.
     """
-    trials = [figures(measures(trial), team.robot_seat) for trial in play_trials(layout, team)]
+    trials = [trial_measures(measures(trial), team.robot_seat) for trial in play_trials(layout, team)]
     return {
         "layout": layout.name,
         "robot": team.robot,

@@ -15,9 +15,9 @@ from typer.testing import CliRunner, Result
 
 from galley.cli import app
 from galley.errors import GalleyError
-from galley.evaluation.entries import Entry
+from galley.evaluation.agent_groups import AgentGroup
 from galley.evaluation.game_graph import PayoffTable, centrality_matrix
-from galley.evaluation.results import Cell, Results
+from galley.evaluation.game_scores import Cell, GameScores
 from galley.learning.plots.bars import draw_bars
 from galley.learning.plots.curves import draw_curves, read_curve, smoothed
 from galley.learning.plots.graphs import draw_graphs, spread
@@ -25,7 +25,7 @@ from galley.learning.plots.matrices import draw_matrices
 from galley.learning.plots.sources import read_payoffs
 from galley.plot_style import COLOURS, DARK_GREY, GREY, save, titled
 
-A, B, P = (Entry(name, (name,)) for name in ("a", "b", "p"))
+A, B, P = (AgentGroup(name, (name,)) for name in ("a", "b", "p"))
 SCORES = {
     ("a", "a"): (100, 100),
     ("a", "p"): (0, 40),
@@ -40,8 +40,8 @@ SCORES = {
 PAYOFFS = [[10, 60, 30, 40], [60, 20, 50, 20], [30, 50, 90, 10], [40, 20, 10, 99]]
 
 
-def results(*layouts: str) -> Results:
-    return Results(
+def results(*layouts: str) -> GameScores:
+    return GameScores(
         Cell(layout=layout, seat_0=one, seat_1=other, seed=0, fingerprint="f", scores=scores)
         for layout in layouts
         for (one, other), scores in SCORES.items()
@@ -91,7 +91,7 @@ def test_bars_are_the_means_by_seat_with_their_errors() -> None:
 
 
 def test_bars_without_self_play_need_no_games_with_itself() -> None:
-    few = Results(cell for cell in results("ring") if cell.seat_0 != cell.seat_1)
+    few = GameScores(cell for cell in results("ring") if cell.seat_0 != cell.seat_1)
     (axes,) = draw_bars(few, ["ring"], [A, B], P, itself=False).axes
     assert len(axes.patches) == 4
     with pytest.raises(GalleyError, match="a on seat 0 was not played with a on seat 1"):
@@ -162,7 +162,7 @@ def test_a_curve_is_the_column_of_the_log(tmp_path: Path) -> None:
     # The second row of 200 ticks is the one that went on; rows without numbers are left out.
     assert curve.ticks.tolist() == [100, 200, 300]
     assert curve.values.tolist() == [1, 3, 5]
-    (axes,) = draw_curves([Entry("run", (str(tmp_path / "run"),))], ["score"]).axes
+    (axes,) = draw_curves([AgentGroup("run", (str(tmp_path / "run"),))], ["score"]).axes
     (line,) = axes.lines
     assert line.get_xydata().tolist() == [[100, 1], [200, 3], [300, 5]]
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("ticks", "score")
@@ -171,7 +171,7 @@ def test_a_curve_is_the_column_of_the_log(tmp_path: Path) -> None:
 def test_several_runs_are_their_mean_in_a_band_where_all_have_values(tmp_path: Path) -> None:
     one = log(tmp_path / "one.csv", [0, 100, 200], [0, 10, 20])
     other = log(tmp_path / "other.csv", [50, 150], [25, 35])
-    figure = draw_curves([Entry("both", (str(one), str(other)))], ["score", "generation"])
+    figure = draw_curves([AgentGroup("both", (str(one), str(other)))], ["score", "generation"])
     axes = figure.axes[0]
     (line,) = axes.lines
     found = line.get_xydata()
@@ -184,7 +184,7 @@ def test_several_runs_are_their_mean_in_a_band_where_all_have_values(tmp_path: P
     assert len(figure.axes) == 2
     apart = log(tmp_path / "apart.csv", [500, 600], [0, 1])
     with pytest.raises(GalleyError, match="both: its runs share no ticks"):
-        draw_curves([Entry("both", (str(one), str(apart)))], ["score"])
+        draw_curves([AgentGroup("both", (str(one), str(apart)))], ["score"])
 
 
 def test_smoothing_looks_back_only() -> None:

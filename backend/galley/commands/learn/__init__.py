@@ -1,1 +1,1 @@
-"""`galley learn`: agents made from data (needs the extra `learn`)."""
+"""`galley learn`: agents made from data and by training (extra `learn`), judged, and drawn (extra `plot`)."""

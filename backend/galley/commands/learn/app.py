@@ -6,7 +6,12 @@ import typer
 
 from galley.commands.learn import bc, evaluate, plot, train
 
-app = typer.Typer(help="Make agents (needs PyTorch: pip install 'galley[learn]').", no_args_is_help=True)
+HELP = (
+    "Make agents and judge them. Training needs PyTorch (pip install 'galley[learn]'), evaluate nothing "
+    "more, plot needs Matplotlib (pip install 'galley[plot]')."
+)
+
+app = typer.Typer(help=HELP, no_args_is_help=True)
 app.command()(train.train)
 app.command()(train.export)
 app.command()(train.payoffs)
@@ -15,6 +20,6 @@ app.add_typer(plot.app, name="plot")
 app.command()(bc.bc)
 
 
-@app.callback()
+@app.callback(help=HELP)
 def _learn() -> None:
-    """Make agents (needs PyTorch: pip install 'galley[learn]')."""
+    """Make agents and judge them."""

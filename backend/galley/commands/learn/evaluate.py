@@ -55,17 +55,17 @@ def evaluate(
     json_: JsonOption = False,
 ) -> None:
     """Play agents with each other or with partners, in both seats; print the paper's tables."""
+    from galley.evaluation.agent_groups import agent_groups
     from galley.evaluation.crossplay import Roster, find_layouts, pairings, play_cells
-    from galley.evaluation.entries import entries
-    from galley.evaluation.results import Cell, Results
-    from galley.evaluation.tables import as_rows, report
+    from galley.evaluation.game_scores import Cell, GameScores
+    from galley.evaluation.score_tables import as_rows, report
 
-    rows = entries(agents)
-    columns = None if not partner else entries(partner)
+    rows = agent_groups(agents)
+    columns = None if not partner else agent_groups(partner)
     pairs = pairings(rows, columns, itself)
     names = list(dict.fromkeys(name for pair in pairs for name in pair))
     layouts = find_layouts(workspace, Roster(workspace), names, layout or [])
-    results = Results.load(out) if out is not None and out.is_file() else Results()
+    results = GameScores.load(out) if out is not None and out.is_file() else GameScores()
     with typer.progressbar(
         length=len(layouts) * len(pairs), label="seat orders", file=typer.get_text_stream("stderr")
     ) as bar:

@@ -59,20 +59,20 @@ def bars(
 ) -> None:
     """Draw scores with a partner as bars with standard errors, by layout and seat (as Fig. 7, 9, 11)."""
     _require_drawing(out)
-    from galley.evaluation.entries import entries, entry
-    from galley.evaluation.results import Results
+    from galley.evaluation.agent_groups import agent_group, agent_groups
+    from galley.evaluation.game_scores import GameScores
     from galley.learning.plots.bars import draw_bars
     from galley.plot_style import save
 
-    kept = Results.load(results)
-    beside = entry(partner)
+    kept = GameScores.load(results)
+    beside = agent_group(partner)
     found = [cell.seat_0 for cell in kept if cell.seat_1 in beside.members]
     named = agent or [name for name in dict.fromkeys(found) if name not in beside.members]
     if not named:
         raise GalleyError(
             f"{results}: nobody was played with {partner}; play them with galley learn evaluate"
         )
-    save(draw_bars(kept, layout or kept.layouts, entries(named), beside, itself), out)
+    save(draw_bars(kept, layout or kept.layouts, agent_groups(named), beside, itself), out)
 
 
 @app.command()
@@ -87,7 +87,7 @@ def matrices(
 ) -> None:
     """Draw payoffs and preference centralities as squares (as Fig. 2b, 10); print the mean of the newest."""
     _require_drawing(out)
-    from galley.evaluation.entries import entries
+    from galley.evaluation.agent_groups import agent_groups
     from galley.evaluation.game_graph import centrality_matrix, newest_centralities
     from galley.learning.plots.matrices import draw_matrices
     from galley.learning.plots.sources import read_payoffs
@@ -95,7 +95,7 @@ def matrices(
 
     found = [
         (one.label.removesuffix(Path(file).suffix), read_payoffs(Path(file), layout, agent or ()))
-        for one in entries(tables)
+        for one in agent_groups(tables)
         for file in one.members
     ]
     save(draw_matrices(found), out)
@@ -146,17 +146,17 @@ def curves(
 ) -> None:
     """Draw columns of the logs of runs against ticks; several runs of one label as their mean in a band."""
     _require_drawing(out)
-    from galley.evaluation.entries import entries
+    from galley.evaluation.agent_groups import agent_groups
     from galley.learning.plots.curves import draw_curves
     from galley.plot_style import save
 
-    save(draw_curves(entries(runs), column or ["score"], against, smooth), out)
+    save(draw_curves(agent_groups(runs), column or ["score"], against, smooth), out)
 
 
 def _require_drawing(out: Path) -> None:
     missing = [name for name in ("matplotlib", "networkx") if importlib.util.find_spec(name) is None]
     if missing:
-        raise GalleyError(f"drawing needs {', '.join(missing)}; install: pip install 'galley[learn]'")
+        raise GalleyError(f"drawing needs {', '.join(missing)}; install: pip install 'galley[plot]'")
     from galley.plot_style import require_ending
 
     require_ending(out)

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from galley.evaluation.entries import Entry, with_partner
-from galley.evaluation.results import Results
+from galley.evaluation.agent_groups import AgentGroup, with_partner
+from galley.evaluation.game_scores import GameScores
 from galley.plot_style import COLOURS, DARK_GREY, GREY, new_figure, styled, titled
 
 HATCH = "//////"
@@ -17,7 +17,11 @@ GROUP = 0.84
 
 
 def draw_bars(
-    results: Results, layouts: Sequence[str], agents: Sequence[Entry], partner: Entry, itself: bool
+    results: GameScores,
+    layouts: Sequence[str],
+    agents: Sequence[AgentGroup],
+    partner: AgentGroup,
+    itself: bool,
 ) -> Figure:
     """Bars with standard errors: plain on seat 0, hatched on seat 1; `itself` adds self-play in grey behind.
 

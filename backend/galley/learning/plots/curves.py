@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from galley.errors import GalleyError
-from galley.evaluation.entries import Entry
+from galley.evaluation.agent_groups import AgentGroup
 from galley.names import name_fix
 from galley.plot_style import COLOURS, LINES, new_figure, styled
 
@@ -72,7 +72,7 @@ def smoothed(values: NDArray[np.float64], window: int) -> NDArray[np.float64]:
 
 
 def draw_curves(
-    runs: Sequence[Entry], columns: Sequence[str], against: str = "ticks", smooth: int = 1
+    runs: Sequence[AgentGroup], columns: Sequence[str], against: str = "ticks", smooth: int = 1
 ) -> Figure:
     """Each column against ticks in its own panel; an entry of several runs is their mean in a band.
 
@@ -99,7 +99,7 @@ def draw_curves(
     return figure
 
 
-def _draw(axes: Axes, entry: Entry, column: str, against: str, smooth: int, number: int) -> None:
+def _draw(axes: Axes, entry: AgentGroup, column: str, against: str, smooth: int, number: int) -> None:
     colour, line = COLOURS[number % len(COLOURS)], LINES[number % len(LINES)]
     found = [read_curve(Path(member), column, against) for member in entry.members]
     if len(found) == 1:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from galley.errors import GalleyError
 from galley.evaluation.game_graph import PayoffTable
-from galley.evaluation.results import Results
+from galley.evaluation.game_scores import GameScores
 
 
 def read_payoffs(path: Path, layout: str | None = None, agents: Sequence[str] = ()) -> PayoffTable:
@@ -19,7 +19,7 @@ def read_payoffs(path: Path, layout: str | None = None, agents: Sequence[str] = 
         GalleyError: the file holds no such table, it is not complete, or an agent is not in it.
     """
     if path.suffix == ".json":
-        table = _played(Results.load(path), path, layout, agents)
+        table = _played(GameScores.load(path), path, layout, agents)
     else:
         table = PayoffTable.load(path)
         unknown = [name for name in agents if name not in table.names]
@@ -36,7 +36,7 @@ def read_payoffs(path: Path, layout: str | None = None, agents: Sequence[str] = 
     return table
 
 
-def _played(results: Results, path: Path, layout: str | None, agents: Sequence[str]) -> PayoffTable:
+def _played(results: GameScores, path: Path, layout: str | None, agents: Sequence[str]) -> PayoffTable:
     """The table of an evaluation on one layout."""
     if layout is None:
         if len(results.layouts) != 1:
@@ -48,7 +48,7 @@ def _played(results: Results, path: Path, layout: str | None, agents: Sequence[s
     for seat_0, seat_1 in table.missing():
         cell = results.get(layout, names[seat_0], names[seat_1])
         if cell is not None:
-            table.set(seat_0, seat_1, cell.figure.mean, cell.figure.standard_error, len(cell.scores))
+            table.set(seat_0, seat_1, cell.mean_score.mean, cell.mean_score.standard_error, len(cell.scores))
     return table
 
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from galley.evaluation.entries import ITSELF, Entry, Seats, with_others, with_partner
-from galley.evaluation.results import Figure, Results
+from galley.evaluation.agent_groups import ITSELF, AgentGroup, Seats, with_others, with_partner
+from galley.evaluation.game_scores import GameScores, MeanScore
 
 
 def report(
-    results: Results,
+    results: GameScores,
     layouts: Sequence[str],
-    agents: Sequence[Entry],
-    partners: Sequence[Entry] | None,
+    agents: Sequence[AgentGroup],
+    partners: Sequence[AgentGroup] | None,
     itself: bool,
 ) -> str:
     """All tables of an evaluation: one by seats for each partner, or cross-play and means with all others.
@@ -32,7 +32,9 @@ def report(
     return "\n\n".join(parts)
 
 
-def seat_table(results: Results, layouts: Sequence[str], agents: Sequence[Entry], partner: Entry) -> str:
+def seat_table(
+    results: GameScores, layouts: Sequence[str], agents: Sequence[AgentGroup], partner: AgentGroup
+) -> str:
     """Scores with one partner, for each agent on seat 0 (L), on seat 1 (R) and the mean of both (AVG).
 
     Source: the form of COLE, Table 3.
@@ -47,7 +49,7 @@ def seat_table(results: Results, layouts: Sequence[str], agents: Sequence[Entry]
     return f"{title}\n\n{_table(['agent', 'seat', *layouts], rows)}"
 
 
-def self_table(results: Results, layouts: Sequence[str], agents: Sequence[Entry]) -> str:
+def self_table(results: GameScores, layouts: Sequence[str], agents: Sequence[AgentGroup]) -> str:
     """Scores of each agent with itself."""
     rows = [
         [agent.label, *(_shown(with_partner(results, layout, agent, agent).average) for layout in layouts)]
@@ -56,7 +58,7 @@ def self_table(results: Results, layouts: Sequence[str], agents: Sequence[Entry]
     return f"With itself: mean score (standard error)\n\n{_table(['agent', *layouts], rows)}"
 
 
-def cross_table(results: Results, layout: str, agents: Sequence[Entry]) -> str:
+def cross_table(results: GameScores, layout: str, agents: Sequence[AgentGroup]) -> str:
     """Scores of each agent with each on one layout, means of both seats, and its mean with all others."""
     rows = []
     for agent in agents:
@@ -68,7 +70,7 @@ def cross_table(results: Results, layout: str, agents: Sequence[Entry]) -> str:
     return _table(head, rows)
 
 
-def expert_table(results: Results, layouts: Sequence[str], agents: Sequence[Entry]) -> str:
+def expert_table(results: GameScores, layouts: Sequence[str], agents: Sequence[AgentGroup]) -> str:
     """Mean scores of each agent with all others, both seats, the best of a layout in bold.
 
     Source: the form of COLE, Table 2.
@@ -83,10 +85,10 @@ def expert_table(results: Results, layouts: Sequence[str], agents: Sequence[Entr
 
 
 def as_rows(
-    results: Results,
+    results: GameScores,
     layouts: Sequence[str],
-    agents: Sequence[Entry],
-    partners: Sequence[Entry] | None,
+    agents: Sequence[AgentGroup],
+    partners: Sequence[AgentGroup] | None,
     itself: bool,
 ) -> Iterator[dict[str, Any]]:
     """One JSON object for each layout, agent and partner: scores by seat, their mean, and standard errors."""
@@ -103,7 +105,7 @@ def as_rows(
                 yield {"layout": layout, "agent": agent.label, "partner": "others", "average": figure}
 
 
-def _row(layout: str, agent: Entry, partner: str, seats: Seats) -> dict[str, Any]:
+def _row(layout: str, agent: AgentGroup, partner: str, seats: Seats) -> dict[str, Any]:
     return {
         "layout": layout,
         "agent": agent.label,
@@ -114,7 +116,7 @@ def _row(layout: str, agent: Entry, partner: str, seats: Seats) -> dict[str, Any
     }
 
 
-def _shown(figure: Figure, bold: bool = False) -> str:
+def _shown(figure: MeanScore, bold: bool = False) -> str:
     mean = f"**{figure.mean:.1f}**" if bold else f"{figure.mean:.1f}"
     return f"{mean} ({figure.standard_error:.1f})"
 

@@ -24,7 +24,7 @@ class Spread:
     most: float
 
 
-def figures(trial: Measures, robot_seat: int = 0) -> dict[str, float]:
+def trial_measures(trial: Measures, robot_seat: int = 0) -> dict[str, float]:
     """The measures of one trial as plain numbers; differences are robot minus human.
 
     Performance is left out where there is no order list.

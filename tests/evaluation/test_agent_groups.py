@@ -7,21 +7,21 @@ import math
 import pytest
 
 from galley.errors import GalleyError
-from galley.evaluation.entries import (
-    Entry,
+from galley.evaluation.agent_groups import (
+    AgentGroup,
     Seats,
-    entries,
-    entry,
+    agent_group,
+    agent_groups,
     mean_of,
     with_others,
     with_partner,
 )
-from galley.evaluation.results import Cell, Figure, Results
-from galley.evaluation.tables import as_rows, report
+from galley.evaluation.game_scores import Cell, GameScores, MeanScore
+from galley.evaluation.score_tables import as_rows, report
 
 
-def played(*cells: tuple[str, str, tuple[int, ...]]) -> Results:
-    return Results(
+def played(*cells: tuple[str, str, tuple[int, ...]]) -> GameScores:
+    return GameScores(
         Cell(layout="room", seat_0=one, seat_1=other, seed=0, fingerprint="f", scores=scores)
         for one, other, scores in cells
     )
@@ -38,14 +38,14 @@ GAMES = played(
     ("b", "a", (40, 40)),
     ("p", "p", (0, 0)),
 )
-A, B, P = (Entry(name, (name,)) for name in "abp")
-BOTH = Entry("both", ("a", "b"))
+A, B, P = (AgentGroup(name, (name,)) for name in "abp")
+BOTH = AgentGroup("both", ("a", "b"))
 
 
 def test_entries_are_read_as_they_are_written() -> None:
-    assert entry("sp") == Entry("sp", ("sp",))
-    assert entry("COLE 1:3=cole-1, cole-2") == Entry("COLE 1:3", ("cole-1", "cole-2"))
-    assert entry("runs/today/sp/") == Entry("sp", ("runs/today/sp/",))
+    assert agent_group("sp") == AgentGroup("sp", ("sp",))
+    assert agent_group("COLE 1:3=cole-1, cole-2") == AgentGroup("COLE 1:3", ("cole-1", "cole-2"))
+    assert agent_group("runs/today/sp/") == AgentGroup("sp", ("runs/today/sp/",))
     for text, told in (
         ("sp=", "names no agent"),
         ("=sp", "names no agent"),
@@ -54,60 +54,60 @@ def test_entries_are_read_as_they_are_written() -> None:
         ("x=a,a", "names an agent twice"),
     ):
         with pytest.raises(GalleyError, match=told):
-            entry(text)
+            agent_group(text)
     with pytest.raises(GalleyError, match="sp: named twice"):
-        entries(["sp", "sp=other"])
+        agent_groups(["sp", "sp=other"])
 
 
 def test_left_is_seat_0_and_right_is_seat_1() -> None:
     # (0, 40): mean 20, sample deviation 28.28, error 20. (60, 60): 60, no error. Both: 40, error 20 / 2.
     seats = with_partner(GAMES, "room", A, P)
-    assert seats.left == Figure(20, pytest.approx(20))
-    assert seats.right == Figure(60, 0)
-    assert seats.average == Figure(40, pytest.approx(10))
+    assert seats.left == MeanScore(20, pytest.approx(20))
+    assert seats.right == MeanScore(60, 0)
+    assert seats.average == MeanScore(40, pytest.approx(10))
 
 
 def test_an_agent_with_itself_has_one_seat_order() -> None:
-    alone = Figure(120, pytest.approx(20))
+    alone = MeanScore(120, pytest.approx(20))
     assert with_partner(GAMES, "room", A, A) == Seats(alone, alone, alone)
     # Two seeds with themselves: 120 and 80, not each other's 20 and 40.
     figure = with_partner(GAMES, "room", BOTH, BOTH).average
-    assert figure == Figure(100, pytest.approx(20))
+    assert figure == MeanScore(100, pytest.approx(20))
 
 
 def test_seeds_of_one_method_are_averaged_and_their_spread_is_the_error() -> None:
     seats = with_partner(GAMES, "room", BOTH, P)
     # a: 20 left, 60 right, 40 in the mean; b: 40, 120, 80. Errors: half the difference of the two.
-    assert seats.left == Figure(30, pytest.approx(10))
-    assert seats.right == Figure(90, pytest.approx(30))
-    assert seats.average == Figure(60, pytest.approx(20))
+    assert seats.left == MeanScore(30, pytest.approx(10))
+    assert seats.right == MeanScore(90, pytest.approx(30))
+    assert seats.average == MeanScore(60, pytest.approx(20))
 
 
 def test_several_partners_in_a_column_count_alike() -> None:
-    experts = Entry("experts", ("b", "p"))
+    experts = AgentGroup("experts", ("b", "p"))
     seats = with_partner(GAMES, "room", A, experts)
-    assert seats.left == Figure(20, pytest.approx(10))  # 20 without and 20 with an error of 20
-    assert seats.right == Figure(50, 0)
-    assert seats.average == Figure(35, pytest.approx(5))
+    assert seats.left == MeanScore(20, pytest.approx(10))  # 20 without and 20 with an error of 20
+    assert seats.right == MeanScore(50, 0)
+    assert seats.average == MeanScore(35, pytest.approx(5))
 
 
 def test_others_leave_self_play_out() -> None:
     # a with b: (20 + 40) / 2 = 30; with p: 40, error 10. b with a 30, with p 80, error 20 / 2.
-    assert with_others(GAMES, "room", A, [A, B, P]) == Figure(35, pytest.approx(5))
-    assert with_others(GAMES, "room", B, [A, B, P]) == Figure(55, pytest.approx(5))
-    assert with_others(GAMES, "room", P, [A, B, P]) == Figure(60, pytest.approx(math.hypot(10, 10) / 2))
-    assert with_others(GAMES, "room", BOTH, [BOTH, P]) == Figure(60, pytest.approx(20))
+    assert with_others(GAMES, "room", A, [A, B, P]) == MeanScore(35, pytest.approx(5))
+    assert with_others(GAMES, "room", B, [A, B, P]) == MeanScore(55, pytest.approx(5))
+    assert with_others(GAMES, "room", P, [A, B, P]) == MeanScore(60, pytest.approx(math.hypot(10, 10) / 2))
+    assert with_others(GAMES, "room", BOTH, [BOTH, P]) == MeanScore(60, pytest.approx(20))
     with pytest.raises(GalleyError, match="a has no other"):
         with_others(GAMES, "room", A, [A])
 
 
 def test_errors_of_means_add_in_squares() -> None:
-    assert mean_of([Figure(10, 3), Figure(20, 4)]) == Figure(15, 2.5)
+    assert mean_of([MeanScore(10, 3), MeanScore(20, 4)]) == MeanScore(15, 2.5)
 
 
 def test_what_was_not_played_is_told() -> None:
     with pytest.raises(GalleyError, match="a on seat 0 was not played with q on seat 1 of room"):
-        with_partner(GAMES, "room", A, Entry("q", ("q",)))
+        with_partner(GAMES, "room", A, AgentGroup("q", ("q",)))
 
 
 def test_the_table_by_seats_has_the_form_of_table_3() -> None:

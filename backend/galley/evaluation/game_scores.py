@@ -45,9 +45,9 @@ class Cell(pydantic.BaseModel):
         return self.layout, self.seat_0, self.seat_1
 
     @property
-    def figure(self) -> Figure:
+    def mean_score(self) -> MeanScore:
         """The mean score and its standard error over games."""
-        return Figure.of(self.scores)
+        return MeanScore.of(self.scores)
 
 
 class _File(pydantic.BaseModel):
@@ -58,14 +58,14 @@ class _File(pydantic.BaseModel):
 
 
 @dataclass(frozen=True)
-class Figure:
+class MeanScore:
     """A mean score and its standard error."""
 
     mean: float
     standard_error: float
 
     @classmethod
-    def of(cls, scores: ArrayLike) -> Figure:
+    def of(cls, scores: ArrayLike) -> MeanScore:
         """That of the scores of games; a single one has no error."""
         each = np.asarray(scores)
         error = float(np.std(each, ddof=1) / np.sqrt(each.size)) if each.size > 1 else 0.0
@@ -76,7 +76,7 @@ class Figure:
         return asdict(self)
 
 
-class Results:
+class GameScores:
     """Cells by layout and seats; a later cell takes the place of an earlier one."""
 
     def __init__(self, cells: Iterable[Cell] = ()) -> None:
@@ -121,7 +121,7 @@ class Results:
         write_whole(path, text.replace('{"layout"', '\n{"layout"') + "\n")
 
     @classmethod
-    def load(cls, path: Path) -> Results:
+    def load(cls, path: Path) -> GameScores:
         """The results that were saved at `path`.
 
         Raises:
@@ -148,7 +148,7 @@ class Results:
 
 
 def _row(cell: Cell) -> dict[str, Any]:
-    figure = cell.figure
+    figure = cell.mean_score
     return {
         "layout": cell.layout,
         "seat_0": cell.seat_0,
