@@ -28,13 +28,15 @@ import numpy as np  # noqa: E402
 import torch  # noqa: E402
 
 from galley.kitchen.layout_file import load_layout  # noqa: E402
-from galley.learning.asked import Asked, cole_of, machine_of, settings_of  # noqa: E402
+from galley.learning.options import TrainingOptions  # noqa: E402
+from galley.learning.ppo.forwards import machine_for  # noqa: E402
 from galley.learning.ppo.games import games_with  # noqa: E402
 from galley.learning.ppo.learner import Learner, kitchens_of  # noqa: E402
 from galley.learning.ppo.policy import Policy  # noqa: E402
 from galley.learning.ppo.rollout import Episodes, Pairing  # noqa: E402
 from galley.learning.ppo.update import update  # noqa: E402
-from galley.learning.process import prepare_process  # noqa: E402
+from galley.learning.run_settings import cole_settings, ppo_settings  # noqa: E402
+from galley.learning.torch_process import prepare_process  # noqa: E402
 
 LAYOUT = "counter_circuit"
 POPULATION = 50
@@ -69,8 +71,9 @@ def main() -> None:
 
     prepare_process()
     layout = load_layout(ROOT / "layouts" / f"{LAYOUT}.yaml")
-    asked = Asked("cole-sv", LAYOUT, threads=args.threads, device=args.device, bf16=args.bf16)
-    settings, cole, machine = settings_of(asked)[0], cole_of(asked), machine_of(asked)
+    options = TrainingOptions("cole-sv", LAYOUT)
+    settings, cole = ppo_settings(options)[0], cole_settings(options)
+    machine = machine_for(args.device, args.threads, bf16=args.bf16)
     learner = Learner(layout, settings, 100, 0, machine)
     kitchens = kitchens_of(layout, settings)
     episodes = Episodes(layout, kitchens, machine)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
 import shutil
 import signal
@@ -20,13 +19,17 @@ from galley.agents.catalogue import Catalogue
 from galley.cli import app
 from galley.errors import GalleyError
 from galley.evaluation.game_graph import PayoffTable
+from galley.files.lock import FileLock
 from galley.kitchen.layout_file import load_layout
-from galley.learning.asked import Asked, described, make, parsed_changes, pooled, response_of
 from galley.learning.bundles.from_runs import export
-from galley.learning.bundles.training_card import command, paper_ticks
+from galley.learning.bundles.training_card import command
+from galley.learning.checkpoint_payoffs import checkpoint_payoffs
+from galley.learning.methods.table import METHODS
+from galley.learning.options import TrainingOptions, parsed_changes
+from galley.learning.policy_files import self_play_milestones
 from galley.learning.ppo.learner import Learner
-from galley.learning.run_folder import RunFolder
-from galley.learning.run_payoffs import run_payoffs
+from galley.learning.run_settings import response_settings, run_description
+from galley.learning.training_run import TrainingFolder, make_training
 from galley.workspace import Workspace
 from tests.learning.kitchens import CPU, QUICK
 
@@ -65,30 +68,37 @@ def train(workspace: Path, *words: str) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("asked", "told"),
+    ("options", "told"),
     [
-        (Asked("spp", "tiny"), "method 'spp' is unknown"),
-        (Asked("cole-sv", "tiny", ratio="4:0"), "ratio '4:0' is unknown; use one of 0:4 1:3 2:2 3:1"),
-        (Asked("sp", "tiny", scale=0), "scale is 0; use a number above 0"),
-        (Asked("sp", "tiny", device="tpu"), "device 'tpu' is unknown; use cpu or cuda"),
-        (Asked("mep", "tiny", population=1), "population is 1; use 2 to 64"),
-        (Asked("sp", "tiny", changes=(("clip", -1.0),)), "clip is -1"),
-        (Asked("pbt", "tiny", pool=("runs/x",)), "--pool gives FCP and COLE a population"),
-        (Asked("fcp", "tiny", pool=("runs/absent",)), "runs/absent: is no run"),
-        (Asked("cole-sv", "tiny", changes=(("ticks", 20.0),)), "too few for ratio"),
+        (TrainingOptions("spp", "tiny"), "method 'spp' is unknown"),
+        (
+            TrainingOptions("cole-sv", "tiny", ratio="4:0"),
+            "ratio '4:0' is unknown; use one of 0:4 1:3 2:2 3:1",
+        ),
+        (TrainingOptions("sp", "tiny", scale=0), "scale is 0; use a number above 0"),
+        (TrainingOptions("sp", "tiny", device="tpu"), "device 'tpu' is unknown; use cpu or cuda"),
+        (TrainingOptions("mep", "tiny", population=1), "population is 1; use 2 to 64"),
+        (TrainingOptions("sp", "tiny", changes=(("clip", -1.0),)), "clip is -1"),
+        (TrainingOptions("pbt", "tiny", pool=("runs/x",)), "--pool gives FCP and COLE a population"),
+        (TrainingOptions("fcp", "tiny", pool=("runs/absent",)), "runs/absent: is no run"),
+        (TrainingOptions("cole-sv", "tiny", changes=(("ticks", 20.0),)), "too few for ratio"),
     ],
 )
-def test_wrong_wishes_are_told_before_anything_is_trained(workspace: Path, asked: Asked, told: str) -> None:
+def test_wrong_options_are_told_before_anything_is_trained(
+    workspace: Path, options: TrainingOptions, told: str
+) -> None:
     layout = load_layout(workspace / "layouts" / "tiny.yaml")
     with pytest.raises(GalleyError) as raised:
-        make(asked, layout)
+        make_training(options, layout)
     assert told in str(raised.value)
 
 
 @pytest.mark.skipif(torch.cuda.is_available(), reason="there is a GPU here")
 def test_a_gpu_that_is_not_there_is_told(workspace: Path) -> None:
     with pytest.raises(GalleyError, match="finds no CUDA GPU here; use --device cpu"):
-        make(Asked("sp", "tiny", device="cuda"), load_layout(workspace / "layouts" / "tiny.yaml"))
+        make_training(
+            TrainingOptions("sp", "tiny", device="cuda"), load_layout(workspace / "layouts" / "tiny.yaml")
+        )
 
 
 def test_unknown_layouts_and_constants_are_told(workspace: Path) -> None:
@@ -104,24 +114,27 @@ def test_unknown_layouts_and_constants_are_told(workspace: Path) -> None:
 
 
 def test_published_constants_are_the_defaults(workspace: Path) -> None:
-    told = described(Asked("cole-sv", "counter_circuit"))
+    told = run_description(TrainingOptions("cole-sv", "counter_circuit"))
     assert told["ppo"] | {"learning_rate": 8e-4, "clip": 0.05, "epochs": 8, "ticks": 48_000} == told["ppo"]
     assert (told["cole"]["generations"], told["cole"]["updates"], told["cole"]["cap"]) == (70, 10, 50)
-    assert paper_ticks("cole-sv", "counter_circuit") == 70 * 10 * 48_000
-    assert described(Asked("sp", "cramped_room"))["ppo"]["minibatches"] == 6
+    assert METHODS["cole-sv"].source_ticks("counter_circuit") == 70 * 10 * 48_000
+    assert run_description(TrainingOptions("sp", "cramped_room"))["ppo"]["minibatches"] == 6
 
 
 def test_a_best_response_is_paid_for_its_own_deeds_unless_asked_otherwise() -> None:
-    asked = Asked("fcp", "cramped_room", quick=True, scale=0.1, response=4)
-    found = response_of(asked)
+    asked = TrainingOptions("fcp", "cramped_room", quick=True, scale=0.1, response=4)
+    found = response_settings(asked)
     assert (found.partner_shaping, found.lambda_) == (0.0, 0.9)
     assert found.shaping_ticks == pytest.approx(0.9 * 4 * 0.1 * 6e6)
-    assert make(asked, load_layout(ROOT / "layouts" / "cramped_room.yaml")).response.learner.settings == found
+    assert (
+        make_training(asked, load_layout(ROOT / "layouts" / "cramped_room.yaml")).response.learner.settings
+        == found
+    )
     changes = (("partner_shaping", 0.5), ("shaping_ticks", 7.0))
-    changed = response_of(replace(asked, changes=changes))
+    changed = response_settings(replace(asked, changes=changes))
     assert (changed.partner_shaping, changed.lambda_) == (0.5, 0.9)
     assert changed.shaping_ticks == found.shaping_ticks  # what was asked for is the population's
-    changed = response_of(replace(asked, changes=changes, pool=("runs/sp-ring-0",)))
+    changed = response_settings(replace(asked, changes=changes, pool=("runs/sp-ring-0",)))
     assert (changed.partner_shaping, changed.shaping_ticks) == (0.5, 7.0)
 
 
@@ -130,7 +143,7 @@ def test_runs_become_an_agent_with_a_card(workspace: Path) -> None:
     assert {path.name for path in (run / "members").iterdir()} == {
         "0025.pt", "0050.pt", "best.pt", "early.pt", "final.pt", "half.pt",
     }  # fmt: skip
-    table = run_payoffs(workspace, run, games=2)
+    table = checkpoint_payoffs(workspace, run, games=2)
     assert table.names == ["0025", "0050"]
     assert table.games.tolist() == [[2, 2], [2, 2]]
     assert PayoffTable.load(run / "payoffs.npz").names == table.names
@@ -152,7 +165,7 @@ def test_runs_become_an_agent_with_a_card(workspace: Path) -> None:
     again = train(workspace, "fcp", "--layout", "tiny", "--scale", "0.00002", "--pool", str(run))
     assert "--pool" in command(json.loads((again / "run.json").read_text()))
     assert "--response" not in command(json.loads((again / "run.json").read_text()))
-    assert "--response 3" in command(described(Asked("mep", "tiny", response=3)))
+    assert "--response 3" in command(run_description(TrainingOptions("mep", "tiny", response=3)))
     response = export(workspace, [again], "response").path
     assert "galley learn train sp --layout tiny --seed 0" in (response / "card.md").read_text()
     facts = json.loads((response / "training.json").read_text())
@@ -166,23 +179,21 @@ def test_runs_become_an_agent_with_a_card(workspace: Path) -> None:
 def test_only_finished_runs_of_self_play_make_a_pool(workspace: Path, tmp_path: Path) -> None:
     layout = load_layout(workspace / "layouts" / "tiny.yaml")
     run = train(workspace, "sp", "--layout", "tiny", "--scale", "0.00002")
-    assert list(pooled([str(run)], layout, CPU.device)) == [
+    assert list(self_play_milestones([str(run)], layout, CPU.device)) == [
         f"sp-tiny-0-{stage}" for stage in ("early", "half", "final")
     ]
     other = load_layout(workspace / "layouts" / "cramped_room.yaml")
     with pytest.raises(GalleyError, match="finished runs of sp on cramped_room"):
-        pooled([str(run)], other, CPU.device)
-    RunFolder(tmp_path / "begun", {"method": "sp", "layout": "tiny"})
+        self_play_milestones([str(run)], other, CPU.device)
+    TrainingFolder(tmp_path / "begun", {"method": "sp", "layout": "tiny"})
     with pytest.raises(GalleyError, match="is not finished"):
         export(workspace, [tmp_path / "begun"], "early")
 
 
 def test_two_processes_do_not_train_in_one_folder(workspace: Path) -> None:
     run = train(workspace, "sp", "--layout", "tiny", "--scale", "0.00002")
-    with (run / "run.json").open() as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        with pytest.raises(GalleyError, match="another process trains here"):
-            train(workspace, "sp", "--layout", "tiny", "--scale", "0.00002")
+    with FileLock(run / "lock", "unused"), pytest.raises(GalleyError, match="another process trains here"):
+        train(workspace, "sp", "--layout", "tiny", "--scale", "0.00002")
 
 
 def test_the_same_command_goes_on_after_kill_9(workspace: Path) -> None:

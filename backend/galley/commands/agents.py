@@ -79,7 +79,7 @@ def play(
     """Let two agents play each other in both seat orders; print mean scores and standard errors."""
     from galley.agents.catalogue import Catalogue
     from galley.agents.episode import play_both_orders
-    from galley.evaluation.results import Figure
+    from galley.evaluation.game_scores import MeanScore
     from galley.kitchen.layout_file import find_layout
     from galley.workspace import Workspace
 
@@ -88,7 +88,7 @@ def play(
     bundles = catalogue.bundle(first), catalogue.bundle(second)
     both = play_both_orders(*bundles, find_layout(place, layout), games, seed)
     for seats, scores in zip(((first, second), (second, first)), both, strict=True):
-        figure = Figure.of(scores)
+        figure = MeanScore.of(scores)
         row = {
             "seats": seats,
             "layout": layout,

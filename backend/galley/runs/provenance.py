@@ -4,25 +4,18 @@ from __future__ import annotations
 
 import platform
 import subprocess
+from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Final
-
-import torch
-
-ORIGIN: Final = ("commit", "galley", "torch", "processor")
 
 
-def origin(device: str) -> dict[str, str]:
-    """The values of `ORIGIN` for a run on device cpu or cuda; "" for what cannot be known."""
-    processor = _processor()
-    if device == "cuda":
-        processor = f"{torch.cuda.get_device_name()} and {processor}"
+def provenance(libraries: Mapping[str, str] | None = None, accelerator: str = "") -> dict[str, str]:
+    """Commit, version of Galley, `libraries` with theirs, and processor; "" for what cannot be known."""
     return {
         "commit": _commit(),
         "galley": _version("galley"),
-        "torch": torch.__version__,
-        "processor": processor,
+        **(libraries or {}),
+        "processor": f"{accelerator} and {_processor()}" if accelerator else _processor(),
     }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import math
 from collections import Counter
 from collections.abc import Callable
@@ -15,17 +16,18 @@ from galley.errors import GalleyError
 from galley.kitchen import Layout
 from galley.learning.methods import pbt
 from galley.learning.methods.best_response import BestResponse, priorities
-from galley.learning.methods.cole import Cole, ColeSettings
+from galley.learning.methods.cole import Cole
+from galley.learning.methods.cole_settings import ColeSettings
 from galley.learning.methods.fcp import FCP
 from galley.learning.methods.mep import MEP
 from galley.learning.methods.milestones import Milestones, checkpoint
 from galley.learning.methods.pbt import MUTATED, PBT, mutated
 from galley.learning.methods.self_play import SelfPlay
+from galley.learning.policy_files import load_policy
 from galley.learning.ppo.constants import PPOSettings
 from galley.learning.ppo.policy import Policy
 from galley.learning.ppo.rollout import Pairing
-from galley.learning.run_folder import RunFolder
-from galley.learning.training import Training, run
+from galley.learning.training_run import Training, TrainingFolder, train_to_end
 from tests.learning.kitchens import CPU, QUICK, SMALL, policy
 
 COLE = ColeSettings(
@@ -43,16 +45,12 @@ METHODS: dict[str, Callable[[], Training]] = {
 }
 
 
-def folder_at(path: Path) -> RunFolder:
-    return RunFolder(path, {"method": "any"})
-
-
 def finish(make: Callable[[], Training], path: Path, stop_after: int | None = None) -> Training:
     """A run in `path` from its last state; given up, as if killed, in the step after `stop_after`."""
     training = make()
-    folder = folder_at(path)
+    folder = TrainingFolder(path, {"method": "any"})
     if stop_after is None:
-        run(training, folder, lambda name: folder.member(name, SMALL, CPU.device), save_every_s=0.0)
+        train_to_end(training, folder, SMALL, CPU.device, save_every_s=0.0)
         return training
 
     def give_up(share: float, row: object) -> None:
@@ -63,13 +61,7 @@ def finish(make: Callable[[], Training], path: Path, stop_after: int | None = No
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run(
-            training,
-            folder,
-            lambda name: folder.member(name, SMALL, CPU.device),
-            save_every_s=0.0,
-            tell=give_up,
-        )
+        train_to_end(training, folder, SMALL, CPU.device, save_every_s=0.0, tell=give_up)
     return training
 
 
@@ -101,6 +93,26 @@ def test_a_stopped_run_ends_as_an_unbroken_one(
     for name in members[0]:
         one, other = (torch.load(tmp_path / at / "members" / name) for at in ("whole", "broken"))
         assert all(torch.equal(one[key], other[key]) for key in one)
+
+
+def test_a_run_that_an_earlier_version_began_goes_on(tmp_path: Path) -> None:
+    whole = finish(METHODS["sp"], tmp_path / "whole")
+    finish(METHODS["sp"], tmp_path / "old", 1)
+    state = torch.load(tmp_path / "old" / "state.pt")
+    earlier = {"clip_fraction": "clipped", "approx_kl": "divergence"}
+    for row in state["log"]:
+        del row["explained_variance"]
+    state["log"] = [{earlier.get(key, key): value for key, value in row.items()} for row in state["log"]]
+    torch.save(state, tmp_path / "old" / "state.pt")
+    again = finish(METHODS["sp"], tmp_path / "old")
+    for one, other in zip(weights(whole.best()), weights(again.best()), strict=True):
+        assert torch.equal(one, other)
+    logs = []
+    for name in ("whole", "old"):
+        with (tmp_path / name / "log.csv").open() as file:
+            logs.append([{**row, "seconds": ""} for row in csv.DictReader(file)])
+    logs[0][0]["explained_variance"] = ""  # which the earlier version did not know
+    assert logs[0] == logs[1]
 
 
 def test_cole_measures_everybody_and_keeps_to_its_cap() -> None:
@@ -289,21 +301,21 @@ def test_mutation_varies_a_third_of_the_constants_by_a_quarter() -> None:
 
 
 def test_a_folder_of_another_run_is_refused(tmp_path: Path) -> None:
-    RunFolder(tmp_path / "run", {"method": "sp", "seed": 1})
+    TrainingFolder(tmp_path / "run", {"method": "sp", "seed": 1})
     with pytest.raises(GalleyError, match=r"seed 1 \(asked: 2\)"):
-        RunFolder(tmp_path / "run", {"method": "sp", "seed": 2})
+        TrainingFolder(tmp_path / "run", {"method": "sp", "seed": 2})
 
 
 def test_a_damaged_state_is_told(tmp_path: Path) -> None:
-    folder = folder_at(tmp_path)
+    folder = TrainingFolder(tmp_path, {"method": "any"})
     (tmp_path / "state.pt").write_bytes(b"half a fi")
     with pytest.raises(GalleyError, match="cannot be read"):
         folder.load()
 
 
 def test_a_policy_of_another_shape_is_told(tmp_path: Path) -> None:
-    folder = folder_at(tmp_path)
-    folder.keep("one", Policy(SMALL))
+    folder = TrainingFolder(tmp_path, {"method": "any"})
+    folder.keep("one", Policy(SMALL).state_dict())
     wide = Layout.from_ascii("wide", "XXPXXX\nO1 2 O\nX    X\nXDXSXX")
     with pytest.raises(GalleyError, match="do not fit layout wide"):
-        folder.member("one", wide, CPU.device)
+        load_policy(folder.member_path("one"), wide, CPU.device)

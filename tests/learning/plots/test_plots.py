@@ -155,6 +155,19 @@ def test_steps_are_spread_or_chosen() -> None:
     assert draw_graphs(table([[0, 0], [0, 0]])).axes
 
 
+def test_logs_of_earlier_versions_are_drawn_under_either_name(tmp_path: Path) -> None:
+    (tmp_path / "old.csv").write_text("ticks,clipped,divergence\n1,0.5,0.25\n")
+    (tmp_path / "new.csv").write_text("ticks,clip_fraction,approx_kl\n1,0.5,0.25\n")
+    for file in (tmp_path / "old.csv", tmp_path / "new.csv"):
+        for column, value in (
+            ("clipped", 0.5),
+            ("clip_fraction", 0.5),
+            ("divergence", 0.25),
+            ("approx_kl", 0.25),
+        ):
+            assert read_curve(file, column).values.tolist() == [value]
+
+
 def test_a_curve_is_the_column_of_the_log(tmp_path: Path) -> None:
     ticks, scores = [100, 200, 300, 200, 400, "x"], [1, "", 5, 3, float("nan"), 9]
     log(tmp_path / "run" / "log.csv", ticks, scores)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from galley.learning.ppo.constants import PPOSettings
 from galley.learning.ppo.forwards import Machine
 from galley.learning.ppo.learner import Learner
 from galley.learning.ppo.rollout import Episodes, Pairing, Rollout
-from galley.learning.ppo.update import adam, advantages, shaping_weight, update
+from galley.learning.ppo.update import adam, advantages, explained_variance, shaping_weight, update
 from tests.learning.kitchens import CPU, QUICK, SMALL
 
 
@@ -48,6 +49,16 @@ def test_advantages_are_the_sum_of_discounted_surprises() -> None:
     ]
     np.testing.assert_allclose(found.flatten().numpy(), wanted, rtol=1e-6)
     np.testing.assert_allclose(returns.flatten().numpy(), np.add(wanted, values), rtol=1e-6)
+
+
+def test_explained_variance_is_the_share_that_the_values_explain() -> None:
+    returns = torch.tensor([[1.0, 2.0], [3.0, 4.0]])
+    assert explained_variance(returns + 7.0, returns) == pytest.approx(1.0)
+    assert explained_variance(torch.zeros(2, 2), returns) == pytest.approx(0.0)
+    assert explained_variance(torch.tensor([[1.0, 2.0], [3.0, 2.0]]), returns) == pytest.approx(
+        1 - 0.75 / 1.25
+    )
+    assert math.isnan(explained_variance(returns, torch.ones(2, 2)))
 
 
 def test_with_lambda_1_returns_are_what_was_paid() -> None:

@@ -2,120 +2,66 @@
 
 from __future__ import annotations
 
+import inspect
 import os
+from collections.abc import Iterator
+from dataclasses import MISSING
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, get_type_hints
 
 import typer
 
 from galley.commands.options import WorkspaceOption
+from galley.learning.methods.table import METHODS
+from galley.learning.options import TrainingOptions, asked_options
 
 
-class Method(StrEnum):
-    """How a partner is trained."""
+def _parameters() -> Iterator[inspect.Parameter]:
+    """The parameters of `galley learn train`: the method and a row of the table of options each."""
+    kinds = get_type_hints(TrainingOptions)
+    names = StrEnum("Method", {name: name for name in METHODS})  # type: ignore[misc]  # mypy wants a literal
+    named = typer.Argument(metavar="METHOD", help=" ".join(METHODS))
+    yield inspect.Parameter("method", inspect.Parameter.KEYWORD_ONLY, annotation=Annotated[names, named])
+    for name, (field, option) in asked_options().items():
+        kind, default = (kinds[name], field.default) if option.kind is None else (option.kind, None)
+        told = typer.Option(
+            option.flag, metavar=option.metavar, min=option.least, help=option.help,
+            show_default=option.shown_default or True,
+        )  # fmt: skip
+        yield inspect.Parameter(
+            name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=inspect.Parameter.empty if default is MISSING else False if kind is bool else default,
+            annotation=Annotated[kind, told],
+        )
+    out = typer.Option(metavar="DIR", help="Folder of the run.", show_default="runs/METHOD-LAYOUT-SEED")
+    yield inspect.Parameter(
+        "out", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=Annotated[Path | None, out]
+    )
+    yield inspect.Parameter(
+        "workspace", inspect.Parameter.KEYWORD_ONLY, default=Path(), annotation=WorkspaceOption
+    )
 
-    sp = "sp"
-    pbt = "pbt"
-    fcp = "fcp"
-    mep = "mep"
-    cole_sv = "cole-sv"
-    cole_r = "cole-r"
 
-
-def train(
-    method: Annotated[Method, typer.Argument(metavar="METHOD", help="sp pbt fcp mep cole-sv cole-r")],
-    layout: Annotated[str, typer.Option(metavar="NAME", help="Layout to train on.")],
-    seed: Annotated[int, typer.Option(min=0, metavar="N", help="Seed of everything in the run.")] = 0,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="Larger steps than the papers', for a fifth of the ticks.")
-    ] = False,
-    scale: Annotated[
-        float, typer.Option(metavar="X", help="Share of the papers' ticks (COLE: generations).")
-    ] = 1.0,
-    ratio: Annotated[
-        str, typer.Option(metavar="A:B", help="COLE: kitchens with itself : with others.")
-    ] = "1:3",
-    partners: Annotated[
-        int | None,
-        typer.Option(min=1, metavar="N", help="COLE: partners drawn for an update.", show_default="B"),
-    ] = None,
-    generations: Annotated[
-        int | None, typer.Option(min=1, metavar="N", help="COLE: generations, whatever the scale.")
-    ] = None,
-    generation_updates: Annotated[
-        int | None, typer.Option(min=1, metavar="N", help="COLE: updates of a generation.", show_default="10")
-    ] = None,
-    population: Annotated[
-        int | None,
-        typer.Option(metavar="N", help="PBT, FCP, MEP: policies in the population.", show_default="3, 8, 5"),
-    ] = None,
-    pool: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="RUN", help="FCP, COLE: a finished run of sp for the first population, once each."
-        ),
-    ] = None,
-    response: Annotated[
-        float, typer.Option(metavar="X", help="FCP, MEP: ticks of the best response for one of a member.")
-    ] = 2.0,
-    no_wpg: Annotated[
-        bool, typer.Option("--no-wpg", help="COLE: leave the weighted PageRank out (ablation).")
-    ] = False,
-    no_sucg: Annotated[
-        bool, typer.Option("--no-sucg", help="COLE: draw partners by the solver alone (ablation).")
-    ] = False,
-    set_: Annotated[
-        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Change a constant of PPO.")
-    ] = None,
-    threads: Annotated[
-        int | None,
-        typer.Option(
-            min=1, metavar="N", help="Threads; other numbers round differently.", show_default="all"
-        ),
-    ] = None,
-    device: Annotated[str, typer.Option(metavar="NAME", help="cpu or cuda.")] = "cpu",
-    bf16: Annotated[
-        bool, typer.Option("--bf16", help="Networks in bfloat16, where the processor has it.")
-    ] = False,
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Folder of the run.", show_default="runs/METHOD-LAYOUT-SEED"),
-    ] = None,
-    workspace: WorkspaceOption = Path(),
-) -> None:
+def train(*, method: str, out: Path | None, workspace: Path, **given: Any) -> None:
     """Train a partner; the same command goes on with a run that was stopped."""
     from galley.kitchen.layout_file import find_layout
-    from galley.learning.asked import Asked, parsed_changes
-    from galley.learning.methods.cole import ColeSettings
-    from galley.learning.train import train_run
+    from galley.learning.training_run import train_run
     from galley.workspace import Workspace
 
     place = Workspace(workspace)
-    kitchen = find_layout(place, layout)
-    asked = Asked(
-        method=method.value,
-        layout=kitchen.name,
-        seed=seed,
-        quick=quick,
-        scale=scale,
-        ratio=ratio,
-        partners=partners,
-        weighted=not no_wpg,
-        exploration=0.0 if no_sucg else ColeSettings.exploration,
-        generations=generations,
-        generation_updates=generation_updates,
-        population=population,
-        pool=tuple(pool or ()),
-        response=response,
-        changes=parsed_changes(set_ or ()),
-        threads=threads or os.cpu_count() or 1,
-        device=device,
-        bf16=bf16,
-    )
-    path = out or place.path / "runs" / f"{method.value}-{kitchen.name}-{seed}"
-    train_run(asked, kitchen, path)
-    typer.echo(f"{path}: done; make an agent of it with: galley learn export {path} --name {method.value}")
+    layout = find_layout(place, given["layout"])
+    values = {name: option.value(given[name]) for name, (_, option) in asked_options().items()}
+    options = TrainingOptions(**{**values, "method": str(method), "layout": layout.name})
+    path = out or place.path / "runs" / f"{method}-{layout.name}-{options.seed}"
+    train_run(options, layout, path)
+    typer.echo(f"{path}: done; make an agent of it with: galley learn export {path} --name {method}")
+
+
+_SIGNATURE = inspect.Signature([*_parameters()])
+train.__signature__ = _SIGNATURE  # type: ignore[attr-defined]  # which Typer reads
+train.__annotations__ = {name: one.annotation for name, one in _SIGNATURE.parameters.items()}
 
 
 def export(
@@ -150,10 +96,10 @@ def payoffs(
     workspace: WorkspaceOption = Path(),
 ) -> None:
     """Play the checkpoints of a run with each other, for galley learn plot matrices and graphs."""
-    from galley.learning.run_payoffs import run_payoffs
+    from galley.learning.checkpoint_payoffs import checkpoint_payoffs
 
     with typer.progressbar(length=100) as bar:
-        run_payoffs(
+        checkpoint_payoffs(
             workspace, run, games=games, seed=seed, threads=os.cpu_count() or 1,
             tell=lambda done, total: bar.update(100 * done // total - bar.pos),
         )  # fmt: skip

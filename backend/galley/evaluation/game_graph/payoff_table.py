@@ -75,7 +75,7 @@ class PayoffTable:
         return [(int(row), int(column)) for row, column in np.argwhere(np.isnan(self.mean))]
 
     def set(self, seat_0: int, seat_1: int, mean: float, standard_error: float = 0.0, games: int = 1) -> None:
-        """Nothing; keeps the mean score of `games` games of one seat order and its standard error.
+        """Keep the mean score of `games` games of one seat order and its standard error.
 
         Raises:
             ValueError: no such strategy, no game, or a number that is not finite or below 0.
@@ -90,7 +90,7 @@ class PayoffTable:
         self.games[seat_0, seat_1] = games
 
     def measure(self, seat_0: int, seat_1: int, scores: NDArray[np.integer]) -> None:
-        """Nothing; keeps mean and standard error of the `scores` [games] of one seat order.
+        """Keep mean and standard error of the `scores` [games] of one seat order.
 
         Raises:
             ValueError: as `set`.
@@ -145,7 +145,7 @@ class PayoffTable:
         return table
 
     def save(self, path: Path) -> None:
-        """Nothing; writes the table to `path` (.npz), whole or not at all."""
+        """Write the table to `path` (.npz), whole or not at all."""
         with whole_file(path) as file:
             names = np.array(self.names, dtype=np.str_)
             np.savez(file, names=names, mean=self.mean, standard_error=self.standard_error, games=self.games)

@@ -14,19 +14,20 @@ from galley.agents.bundle import Bundle, describe_network, load_bundle
 from galley.agents.catalogue import Catalogue
 from galley.agents.episode import play_both_orders, play_episodes
 from galley.errors import GalleyError
-from galley.evaluation.results import Figure
+from galley.evaluation.game_scores import MeanScore
 from galley.files.whole import whole_folder
 from galley.kitchen import Encoder, Layout
 from galley.kitchen.layout_file import find_layout
 from galley.learning.bundles.filled_convolutions import filled
 from galley.learning.bundles.onnx_writing import grid_onnx
 from galley.learning.bundles.training_card import training_card
+from galley.learning.methods.table import METHODS
+from galley.learning.policy_files import TorchStates, finished_run
 from galley.learning.ppo.policy import ENCODING
-from galley.learning.run_folder import load_tensors, run_asked
-from galley.runs.provenance import ORIGIN
 from galley.workspace import Workspace
 
 FACTS: Final = "training.json"
+PROVENANCE: Final = ("commit", "galley", "torch", "processor")
 PARTNERS: Final = {"human-bc": 100, "human-proxy": 200}
 """Whom an exported agent is measured with, and games on either seat. The proxy has no say in any choice."""
 
@@ -53,7 +54,7 @@ def export(
         GalleyError: a run is not finished, not of one method with the others, or of a layout given twice.
     """
     place = Workspace(workspace)
-    asked = [run_asked(run, member) for run in runs]
+    asked = [finished_run(run, member) for run in runs]
     methods = sorted({one["method"] for one in asked})
     if len(methods) > 1:
         raise GalleyError(f"an agent comes from one method, not {' and '.join(methods)}; export them apart")
@@ -64,7 +65,7 @@ def export(
     with whole_folder(home, replace=True, kept=True) as folder:
         facts = _facts(folder)
         for run, one, layout in zip(runs, asked, layouts, strict=True):
-            policy = load_tensors(run / "members" / f"{member}.pt")
+            policy = TorchStates().read(run / "members" / f"{member}.pt")
             weights = {key: tensor.numpy() for key, tensor in policy.items()}
             content = filled(grid_onnx(weights, Encoder(layout, ENCODING).shape))
             (folder / f"{layout.name}.onnx").write_bytes(content)
@@ -82,12 +83,12 @@ def export(
 
 def _described(run: Path, asked: dict[str, Any], member: str) -> dict[str, Any]:
     """What `training.json` keeps of a run, but its scores; `asked` is what its run.json holds."""
-    wishes = {key: value for key, value in asked.items() if key not in ORIGIN}
-    begun = {key: str(asked.get(key, "")) for key in ORIGIN}
-    generation = int(member) if member.isdigit() and asked["method"].startswith("cole") else None
-    facts = {"asked": wishes, **_made(run, generation), **begun, "member": member}
+    options = {key: value for key, value in asked.items() if key not in PROVENANCE}
+    begun = {key: str(asked.get(key, "")) for key in PROVENANCE}
+    generation = int(member) if member.isdigit() and METHODS[asked["method"]].generations else None
+    facts = {"asked": options, **_made(run, generation), **begun, "member": member}
     pool = [Path(path) for path in asked["pool"]]
-    facts["pool"] = [run_asked(path) for path in pool]
+    facts["pool"] = [finished_run(path) for path in pool]
     for made in map(_made, pool):
         facts["ticks"] += made["ticks"]
         facts["seconds"] += made["seconds"]
@@ -112,13 +113,15 @@ def _scores(
     """Mean and standard error with itself, and on seat 0 and seat 1 with each of `PARTNERS`."""
     catalogue = Catalogue(place)
     seeds = np.random.SeedSequence((seed, 1)).generate_state(ITSELF_GAMES, np.uint64).tolist()
-    own = Figure.of(play_episodes(layout, (bundle, bundle), seeds))
+    own = MeanScore.of(play_episodes(layout, (bundle, bundle), seeds))
     found: dict[str, Any] = {"itself": [own.mean, own.standard_error, ITSELF_GAMES]}
     told = [f"itself {own.mean:.1f}"]
     for partner, games in PARTNERS.items():
         if partner not in catalogue.names() or not catalogue.bundle(partner).supports(layout.name):
             continue
-        results = [*map(Figure.of, play_both_orders(bundle, catalogue.bundle(partner), layout, games, seed))]
+        results = [
+            *map(MeanScore.of, play_both_orders(bundle, catalogue.bundle(partner), layout, games, seed))
+        ]
         found[partner] = [[one.mean, one.standard_error, games] for one in results]
         told.append(f"{partner} {results[0].mean:.1f} / {results[1].mean:.1f}")
     tell(f"{layout.name}: {', '.join(told)}")

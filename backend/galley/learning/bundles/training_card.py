@@ -4,25 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, fields
-from typing import Any, Final
+from typing import Any
 
-from galley.learning.asked import Asked, settings_of
-from galley.learning.ppo.constants import constants
-
-TITLES: Final[Mapping[str, tuple[str, str]]] = {
-    "sp": ("Self-play", "Carroll et al. 2019 (arXiv:1910.05789)"),
-    "pbt": ("Population-based training", "Carroll et al. 2019 (arXiv:1910.05789); Jaderberg et al. 2017"),
-    "fcp": ("Fictitious co-play", "Strouse et al. 2021 (arXiv:2110.08176)"),
-    "mep": ("Maximum-entropy population", "Zhao et al. 2023 (arXiv:2112.11701)"),
-    "cole-sv": ("COLE with the graphic Shapley value solver", "COLE paper, Sec. 4 and 5"),
-    "cole-r": ("COLE with the reward solver", "COLE paper, Sec. 4 and 5"),
-}
+from galley.learning.methods.table import METHODS
+from galley.learning.options import TrainingOptions, train_command
+from galley.learning.run_settings import ppo_settings
 
 
 def training_card(name: str, facts: Mapping[str, Any], unstuck_after_ticks: int | None) -> str:
     """The text of `card.md`; `facts` is what `training.json` holds, by layout."""
     first = next(iter(facts.values()))
-    title, source = TITLES[first["asked"]["method"]]
+    method = METHODS[first["asked"]["method"]]
     unstuck = (
         ""
         if unstuck_after_ticks is None
@@ -30,11 +22,11 @@ def training_card(name: str, facts: Mapping[str, Any], unstuck_after_ticks: int 
     )
     made = "\n".join(_made_row(layout, one) for layout, one in facts.items())
     scored = "\n".join(_scored_row(layout, one) for layout, one in facts.items())
-    asked = [wish for one in facts.values() for wish in (*one.get("pool", ()), one["asked"])]
+    asked = [options for one in facts.values() for options in (*one.get("pool", ()), one["asked"])]
     commands = "\n".join(map(command, asked))
     return f"""# {name}
 
-{title}. Source: {source}. The method and its constants are told in `docs/learning.md`.
+{method.title}. Source: {method.source}. The method and its constants are told in `docs/learning.md`.
 
 ```sh
 {commands}
@@ -61,49 +53,20 @@ or tuned by it.
 
 def command(asked: Mapping[str, Any]) -> str:
     """The command that asks for a run."""
-    words = [f"galley learn train {asked['method']} --layout {asked['layout']} --seed {asked['seed']}"]
-    words += ["--quick"] if asked["quick"] else []
-    words += [f"--scale {asked['scale']:g}"] if asked["scale"] != 1 else []
-    if asked["method"].startswith("cole"):
-        words += [f"--ratio {asked['ratio']}"] if asked["ratio"] != "1:3" else []
-        words += [] if asked["weighted"] else ["--no-wpg"]
-        words += [] if asked["exploration"] else ["--no-sucg"]
-    for option in ("partners", "generations", "generation_updates", "population"):
-        if asked.get(option) is not None:
-            words.append(f"--{option.replace('_', '-')} {asked[option]}")
-    words += [f"--pool {run}" for run in asked["pool"]]
-    response = asked.get("response", Asked.response)
-    words += [f"--response {response:g}"] if response != Asked.response else []
-    words += [f"--set {key}={value:g}" for key, value in _changes(asked).items()]
-    words.append(f"--threads {asked['threads']}")
-    words += [f"--device {asked['device']}"] if asked["device"] != "cpu" else []
-    words += ["--bf16"] if asked["bf16"] else []
-    return " ".join(words)
+    return train_command({**asked, "changes": _changes(asked)})
 
 
 def _changes(asked: Mapping[str, Any]) -> dict[str, float]:
     """The constants that were asked for, and those whose defaults were others when the run was made."""
     changes: dict[str, float] = dict(asked["changes"])
-    known = {field.name: asked[field.name] for field in fields(Asked) if field.name in asked}
+    known = {field.name: asked[field.name] for field in fields(TrainingOptions) if field.name in asked}
     known |= {"changes": tuple(sorted(changes.items())), "pool": tuple(asked["pool"])}
-    today = asdict(settings_of(Asked(**known))[0])
+    today = asdict(ppo_settings(TrainingOptions(**known))[0])
     return changes | {name: value for name, value in asked["ppo"].items() if today[name] != value}
 
 
-def paper_ticks(method: str, layout: str) -> float:
-    """Kitchen ticks that the method's source learns from on a layout, all stages together."""
-    known = constants(layout)
-    if method.startswith("cole"):
-        return known.cole_generations * 10 * 48_000
-    if method == "pbt":
-        return 3 * known.pbt_ticks
-    if method == "sp":
-        return known.self_play_ticks
-    return {"fcp": 10.0, "mep": 7.0}[method] * known.self_play_ticks
-
-
 def _made_row(layout: str, one: Mapping[str, Any]) -> str:
-    share = one["ticks"] / paper_ticks(one["asked"]["method"], layout)
+    share = one["ticks"] / METHODS[one["asked"]["method"]].source_ticks(layout)
     member = one.get("member", "best")
     cells = (
         layout if member == "best" else f"{layout}, member {member}",

@@ -14,7 +14,7 @@ from galley.agents.bundle import describe_network, load_bundle
 from galley.agents.episode import play_episodes
 from galley.datasets.overcooked_games import HumanGame, human_games
 from galley.errors import GalleyError
-from galley.evaluation.results import Figure
+from galley.evaluation.game_scores import MeanScore
 from galley.files.whole import whole_folder
 from galley.kitchen import Encoder, Layout
 from galley.kitchen.layout_file import find_layout
@@ -131,7 +131,7 @@ def _self_play(
     rows = []
     for number, (layout, clone) in enumerate(clones.items()):
         seeds = np.random.SeedSequence((seed, number, 1)).generate_state(games, np.uint64).tolist()
-        played = Figure.of(play_episodes(layout, (bundle, bundle), seeds))
+        played = MeanScore.of(play_episodes(layout, (bundle, bundle), seeds))
         tell(f"{layout.name}: score {played.mean:.1f} ± {played.standard_error:.1f} with itself")
         rows.append(
             CardRow(

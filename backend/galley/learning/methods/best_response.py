@@ -15,7 +15,8 @@ from galley.learning.ppo.forwards import Machine
 from galley.learning.ppo.learner import Learner, kitchens_of
 from galley.learning.ppo.policy import Policy
 from galley.learning.ppo.rollout import Episodes, Pairing, derived_seed
-from galley.learning.training import Told, row_of
+from galley.learning.training_log import log_row
+from galley.runs.stepwise import Step
 
 PARTNERS = 6
 """Partners drawn for an update, each for as many kitchens. Ours: more make small batches, fewer are noisy."""
@@ -53,7 +54,7 @@ class BestResponse:
         """Whether all updates are done."""
         return self.learner.done >= self.learner.updates
 
-    def step(self, population: list[Policy], *, ticks_before: int, generation: int) -> Told:
+    def step(self, population: list[Policy], *, ticks_before: int, generation: int) -> Step[Policy]:
         """One update with partners of the population."""
         if len(self.scores) != len(population):
             self.scores = np.full(len(population), np.nan)
@@ -67,26 +68,26 @@ class BestResponse:
         pairings = [
             Pairing(population[one], share) for one, share in zip(drawn.tolist(), shares, strict=True)
         ]
-        rollout, figures = self.learner.learn(self.episodes, pairings)
+        rollout, metrics = self.learner.learn(self.episodes, pairings)
         start = 0
         for one, share in zip(drawn.tolist(), shares, strict=True):
             score = float(rollout.scores[start : start + share].mean())
             start += share
             before = score if np.isnan(self.scores[one]) else self.scores[one]
             self.scores[one] = self.memory * before + (1 - self.memory) * score
-        row = row_of(
-            self.learner, rollout, figures,
+        row = log_row(
+            self.learner, rollout, metrics,
             ticks=ticks_before + self.learner.ticks, generation=generation, stage="best response",
         )  # fmt: skip
         name = checkpoint(self.learner.done, self.learner.updates)
-        return Told(row, {} if name is None else {name: self.learner.frozen()})
+        return Step(row, {} if name is None else {name: self.learner.frozen()})
 
     def state(self) -> dict[str, Any]:
         """What `restore` needs."""
         return {"learner": self.learner.state(), "scores": torch.from_numpy(self.scores.copy())}
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Nothing; goes back to where `state` was taken."""
+        """Go back to where `state` was taken."""
         self.learner.restore(state["learner"])
         self.scores = state["scores"].numpy().copy()
 

@@ -13,7 +13,7 @@ from galley.learning.ppo.constants import PPOSettings
 from galley.learning.ppo.forwards import Machine
 from galley.learning.ppo.policy import Policy
 from galley.learning.ppo.rollout import derived_seed
-from galley.learning.training import Told
+from galley.runs.stepwise import Step
 
 
 class FCP:
@@ -61,7 +61,7 @@ class FCP:
             done += self.training.learner.done
         return done / (self.seeds * self.self_play_updates + self.response.learner.updates)
 
-    def step(self) -> Told:
+    def step(self) -> Step[Policy]:
         """One update of the self-play run at work, or of the best response."""
         learner = self.training.learner
         ticks_before = self.number * self.self_play_updates * learner.settings.ticks
@@ -69,16 +69,16 @@ class FCP:
             return self.response.step(
                 list(self.population.values()), ticks_before=ticks_before, generation=self.seeds
             )
-        told = self.training.step()
-        told.row.update(ticks=ticks_before + learner.ticks, generation=self.number)
+        step = self.training.step()
+        step.row.update(ticks=ticks_before + learner.ticks, generation=self.number)
         if not self.training.finished:
-            return Told(told.row)
-        joined = {f"{self.number:02}-{stage}": told.joined[stage] for stage in STAGES}
+            return Step(step.row)
+        joined = {f"{self.number:02}-{stage}": step.joined[stage] for stage in STAGES}
         self.population.update(joined)
         self.number += 1
         if self.number < self.seeds:
             self.training = self._make(self.number)
-        return Told(told.row, joined)
+        return Step(step.row, joined)
 
     def state(self) -> dict[str, Any]:
         """All but the weights of the population."""
@@ -90,7 +90,7 @@ class FCP:
         }
 
     def restore(self, state: dict[str, Any], member: Callable[[str], Policy]) -> None:
-        """Nothing; goes back to where `state` was taken."""
+        """Go back to where `state` was taken."""
         self.number = state["number"]
         self.training = self._make(max(0, min(self.number, self.seeds - 1)))
         self.training.restore(state["training"], member)

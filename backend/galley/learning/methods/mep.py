@@ -16,7 +16,7 @@ from galley.learning.ppo.forwards import Machine
 from galley.learning.ppo.games import probabilities
 from galley.learning.ppo.policy import Policy
 from galley.learning.ppo.rollout import Rollout, derived_seed
-from galley.learning.training import Told
+from galley.runs.stepwise import Step
 
 
 class MEP:
@@ -61,7 +61,7 @@ class MEP:
         """How many of all updates are done, 0 to 1."""
         return (self._done + self.response.learner.done) / self.total
 
-    def step(self) -> Told:
+    def step(self) -> Step[Policy]:
         """One update of the policy whose turn it is, or of the best response."""
         size = len(self.trainings)
         ticks = self.response.learner.settings.ticks
@@ -71,13 +71,13 @@ class MEP:
             )
         number = self._done % size
         training = self.trainings[number]
-        told = training.step(self._bonus, stage="population")
-        told.row.update(ticks=self._done * ticks, generation=number)
+        step = training.step(self._bonus, stage="population")
+        step.row.update(ticks=self._done * ticks, generation=number)
         joined = {}
         if training.finished:
-            joined = {f"{number:02}-{stage}": told.joined[stage] for stage in STAGES}
+            joined = {f"{number:02}-{stage}": step.joined[stage] for stage in STAGES}
         self.population.update(joined)
-        return Told(told.row, joined)
+        return Step(step.row, joined)
 
     def state(self) -> dict[str, Any]:
         """All but the weights of the population."""
@@ -88,7 +88,7 @@ class MEP:
         }
 
     def restore(self, state: dict[str, Any], member: Callable[[str], Policy]) -> None:
-        """Nothing; goes back to where `state` was taken."""
+        """Go back to where `state` was taken."""
         for training, kept in zip(self.trainings, state["trainings"], strict=True):
             training.restore(kept, member)
         self.population = {name: member(name) for name in state["population"]}

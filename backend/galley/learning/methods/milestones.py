@@ -25,7 +25,7 @@ class Milestones:
         self._kept: list[dict[str, Any]] = []
 
     def note(self, done: int, score: float, policy: Policy) -> None:
-        """Nothing; keeps the policy where `done` updates are on the grid; `score` is that update's."""
+        """Keep the policy where `done` updates are on the grid; `score` is that update's."""
         if done % self._every == 0 or done in (0, self.updates):
             weights = {name: tensor.cpu().clone() for name, tensor in policy.state_dict().items()}
             self._kept.append({"score": score, "weights": weights})
@@ -41,7 +41,7 @@ class Milestones:
         return list(self._kept)
 
     def restore(self, state: list[dict[str, Any]]) -> None:
-        """Nothing; goes back to where `state` was taken."""
+        """Go back to where `state` was taken."""
         self._kept = list(state)
 
 

@@ -16,7 +16,8 @@ from galley.learning.ppo.games import games_with
 from galley.learning.ppo.learner import Learner, kitchens_of
 from galley.learning.ppo.policy import Policy
 from galley.learning.ppo.rollout import Episodes, Pairing, derived_seed
-from galley.learning.training import Told, row_of
+from galley.learning.training_log import log_row
+from galley.runs.stepwise import Step
 
 MUTATED: Final = (
     "lambda_", "clip", "learning_rate", "epochs", "entropy_start", "entropy_end", "value_coefficient",
@@ -70,7 +71,7 @@ class PBT:
         """How many of all updates are done, 0 to 1."""
         return self.done / self.total
 
-    def step(self) -> Told:
+    def step(self) -> Step[Policy]:
         """One pairing, and after the last of a round the selection."""
         size = len(self.learners)
         turn, place = divmod(self.done, size * size)
@@ -79,16 +80,16 @@ class PBT:
         learner = self.learners[number]
         partner = None if number == other else self.learners[other].frozen()
         pairing = Pairing(partner, self.episodes.batch.size)
-        rollout, figures = learner.learn(self.episodes, [pairing], both=True)
+        rollout, metrics = learner.learn(self.episodes, [pairing], both=True)
         self.done += 1
-        row = row_of(
-            learner, rollout, figures,
+        row = log_row(
+            learner, rollout, metrics,
             ticks=self.done * learner.settings.ticks, generation=number, stage=f"with {other}",
         )  # fmt: skip
         if place == size * size - 1 or self.finished:
             self._select(turn, vary=not self.finished)
         name = checkpoint(self.done, self.total)
-        return Told(row, {} if name is None else {name: self.best()})
+        return Step(row, {} if name is None else {name: self.best()})
 
     def state(self) -> dict[str, Any]:
         """All of it."""
@@ -100,7 +101,7 @@ class PBT:
         }
 
     def restore(self, state: dict[str, Any], member: Callable[[str], Policy]) -> None:
-        """Nothing; goes back to where `state` was taken."""
+        """Go back to where `state` was taken."""
         for learner, kept, settings in zip(self.learners, state["learners"], state["settings"], strict=True):
             learner.restore(kept)
             learner.settings = PPOSettings(**settings)
@@ -112,7 +113,7 @@ class PBT:
         return self.learners[int(np.argmax(self.scores))].frozen()
 
     def _select(self, turn: int, *, vary: bool) -> None:
-        """Nothing; measures everybody and lets the worst copy the best."""
+        """Measure everybody and let the worst copy the best."""
         policies = [learner.frozen() for learner in self.learners]
         self.scores = [
             float(

@@ -12,7 +12,8 @@ from galley.learning.ppo.forwards import Machine
 from galley.learning.ppo.learner import Bonus, Learner, kitchens_of
 from galley.learning.ppo.policy import Policy
 from galley.learning.ppo.rollout import Episodes, Pairing, derived_seed
-from galley.learning.training import Told, row_of
+from galley.learning.training_log import log_row
+from galley.runs.stepwise import Step
 
 
 class SelfPlay:
@@ -39,24 +40,24 @@ class SelfPlay:
         """How many of the updates are done, 0 to 1."""
         return self.learner.progress
 
-    def step(self, bonus: Bonus | None = None, *, stage: str = "self-play") -> Told:
+    def step(self, bonus: Bonus | None = None, *, stage: str = "self-play") -> Step[Policy]:
         """One update with itself."""
         kitchens = self.episodes.batch.size
-        rollout, figures = self.learner.learn(
+        rollout, metrics = self.learner.learn(
             self.episodes, [Pairing(None, kitchens)], both=True, bonus=bonus
         )
-        row = row_of(self.learner, rollout, figures, ticks=self.learner.ticks, generation=0, stage=stage)
+        row = log_row(self.learner, rollout, metrics, ticks=self.learner.ticks, generation=0, stage=stage)
         self.milestones.note(self.learner.done, row["score"], self.learner.policy)
         joined = self.milestones.chosen(self.learner.policy) if self.finished else {}
         name = checkpoint(self.learner.done, self.learner.updates)
-        return Told(row, joined if name is None else {name: self.learner.frozen(), **joined})
+        return Step(row, joined if name is None else {name: self.learner.frozen(), **joined})
 
     def state(self) -> dict[str, Any]:
         """All of it."""
         return {"learner": self.learner.state(), "milestones": self.milestones.state()}
 
     def restore(self, state: dict[str, Any], member: Callable[[str], Policy]) -> None:
-        """Nothing; goes back to where `state` was taken."""
+        """Go back to where `state` was taken."""
         self.learner.restore(state["learner"])
         self.milestones.restore(state["milestones"])
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from galley.errors import GalleyError
 from galley.evaluation.agent_groups import AgentGroup
+from galley.learning.training_log import FORMER_COLUMNS
 from galley.names import name_fix
 from galley.plot_style import COLOURS, LINES, new_figure, styled
 
@@ -34,8 +35,9 @@ class Curve:
 def read_curve(run: Path, column: str, against: str = "ticks") -> Curve:
     """A column of a run's log, a CSV file with a header (or a folder with `log.csv`), by growing ticks.
 
-    Rows without a number in either column are left out; of rows with one tick count the last stays, so that a
-    run which was continued from a checkpoint is drawn as it went on.
+    Columns may be named as today or as in earlier versions. Rows without a number in either column are left
+    out; of rows with one tick count the last stays, so that a run which was continued from a checkpoint is
+    drawn as it went on.
 
     Raises:
         GalleyError: the log cannot be read, lacks a column, or holds no number in it.
@@ -44,12 +46,13 @@ def read_curve(run: Path, column: str, against: str = "ticks") -> Curve:
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             reader = csv.DictReader(file)
-            header = list(reader.fieldnames or ())
+            header = {FORMER_COLUMNS.get(name, name): name for name in reader.fieldnames or ()}
             for name in (column, against):
-                if name not in header:
-                    fix = name_fix(name, header)
+                if FORMER_COLUMNS.get(name, name) not in header:
+                    fix = name_fix(name, list(header))
                     raise GalleyError(f"{path}: the log has no column '{name}'; {fix}")
-            rows = [(_number(row[against]), _number(row[column])) for row in reader]
+            x, y = (header[FORMER_COLUMNS.get(name, name)] for name in (against, column))
+            rows = [(_number(row[x]), _number(row[y])) for row in reader]
     except OSError as error:
         raise GalleyError(f"{path}: cannot be read ({error.strerror or error})") from None
     except (csv.Error, UnicodeDecodeError) as error:

@@ -1,9 +1,9 @@
-"""The constants of learning, with their sources."""
+"""The constants of PPO, with their sources."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any
 
 from galley.errors import GalleyError
 
@@ -74,35 +74,3 @@ class PPOSettings:
         if problems:
             raise GalleyError("; ".join(problems))
         return made
-
-
-@dataclass(frozen=True)
-class LayoutConstants:
-    """What the sources set differently on each layout."""
-
-    cole_rate: float
-    cole_generations: int
-    self_play_rate: float
-    self_play_ticks: float
-    shaping_ticks: float
-    pbt_rate: float
-    pbt_ticks: float
-    pbt_shaping_ticks: float
-
-
-LAYOUTS: Final[dict[str, LayoutConstants]] = {
-    "cramped_room": LayoutConstants(2e-3, 80, 1e-3, 6e6, 2.5e6, 2e-3, 8e6, 3e6),
-    "asymmetric_advantages": LayoutConstants(1e-3, 60, 1e-3, 7e6, 2.5e6, 8e-4, 1.1e7, 5e6),
-    "coordination_ring": LayoutConstants(6e-4, 75, 6e-4, 1e7, 3.5e6, 8e-4, 5e6, 4e6),
-    "forced_coordination": LayoutConstants(8e-4, 70, 8e-4, 7.5e6, 2.5e6, 3e-3, 8e6, 7e6),
-    "counter_circuit": LayoutConstants(8e-4, 70, 8e-4, 8e6, 2.5e6, 1e-3, 6e6, 4e6),
-}
-"""Source: COLE paper, App. C (its rates and generations); Carroll et al. 2019, App. C and code (the rest)."""
-
-OTHER: Final = LayoutConstants(8e-4, 70, 8e-4, 8e6, 2.5e6, 1e-3, 8e6, 4e6)
-"""For layouts that no source trained on."""
-
-
-def constants(layout_name: str) -> LayoutConstants:
-    """The sources' constants for a layout, or ours where they have none."""
-    return LAYOUTS.get(layout_name, OTHER)

@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Generic, TypeVar
 
 import torch
 
+from galley.errors import GalleyError
 from galley.learning.ppo.policy import Policy
 
 Job = tuple["Ready", torch.Tensor]
@@ -39,6 +40,21 @@ class Machine:
         if self.threads == 1 or self.device.type != "cpu":
             return None
         return ThreadPoolExecutor(self.threads, initializer=torch.set_num_threads, initargs=(1,))
+
+
+def machine_for(device: str, threads: int, *, bf16: bool) -> Machine:
+    """The machine of a run that was asked for.
+
+    Raises:
+        GalleyError: the device is unknown or absent, or the number of threads cannot be.
+    """
+    if device not in ("cpu", "cuda"):
+        raise GalleyError(f"device {device!r} is unknown; use cpu or cuda")
+    if device == "cuda" and not torch.cuda.is_available():
+        raise GalleyError("device cuda: PyTorch finds no CUDA GPU here; use --device cpu")
+    if threads < 1:
+        raise GalleyError(f"threads is {threads}; use a whole number of at least 1")
+    return Machine(torch.device(device), threads, bf16)
 
 
 class Ready:

@@ -13,7 +13,7 @@ from galley.learning.ppo.constants import PPOSettings
 from galley.learning.ppo.forwards import Machine
 from galley.learning.ppo.policy import Policy
 from galley.learning.ppo.rollout import Episodes, Pairing, Rollout, derived_seed
-from galley.learning.ppo.update import UpdateFigures, adam, shaping_weight, update
+from galley.learning.ppo.update import UpdateMetrics, adam, shaping_weight, update
 
 Bonus = Callable[[Rollout], torch.Tensor]
 
@@ -54,14 +54,14 @@ class Learner:
         both: bool = False,
         bonus: Bonus | None = None,
         progress: float | None = None,
-    ) -> tuple[Rollout, UpdateFigures]:
+    ) -> tuple[Rollout, UpdateMetrics]:
         """One update from one episode of every kitchen, shared out by `pairings`.
 
         `bonus` gives the extra reward [T, N] of a rollout, after scaling; `progress`, 0 to 1, sets rate and
         weight of the entropy where it is not told by the number of updates.
         """
         rollout = episodes.play(self.policy, pairings, derived_seed(self.seed, 1, self.done), both=both)
-        figures = update(
+        metrics = update(
             self.policy,
             self.optimiser,
             rollout,
@@ -73,7 +73,7 @@ class Learner:
             machine=self.machine,
         )
         self.done += 1
-        return rollout, figures
+        return rollout, metrics
 
     def frozen(self) -> Policy:
         """A copy of the policy as it is now, to play with."""
@@ -89,7 +89,7 @@ class Learner:
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Nothing; goes back to where `state` was taken, which may be another learner's that learns on."""
+        """Go back to where `state` was taken, which may be another learner's that learns on."""
         self.policy.load_state_dict(state["policy"])
         self.optimiser.load_state_dict(copy.deepcopy(state["optimiser"]))  # PyTorch would share the tensors
         self.done = int(state["done"])

@@ -37,14 +37,14 @@ class Replicas:
         if self._pool is not None:
             self._pool.shutdown(cancel_futures=True)
 
-    def add_gradients(self, passed: Pass, rows: torch.Tensor, gained: torch.Tensor) -> torch.Tensor:
-        """The sum of what `passed(policy, rows, gained, size)` gives for all parts of a minibatch.
+    def add_gradients(self, backward: Pass, rows: torch.Tensor, advantage: torch.Tensor) -> torch.Tensor:
+        """The sum of what `backward(policy, rows, advantage, size)` gives for all parts of a minibatch.
 
         The gradients of all parts are added to those of the policy itself.
         """
         first, *others = self.policies
         if self._pool is None:
-            return passed(first, rows, gained, len(rows))
+            return backward(first, rows, advantage, len(rows))
         own: list[torch.Tensor] = list(first.parameters())
         for other in others:
             other.zero_grad(set_to_none=True)
@@ -53,7 +53,9 @@ class Replicas:
         parts = len(self.policies)
         size = [len(rows)] * parts
         found = list(
-            self._pool.map(passed, self.policies, rows.tensor_split(parts), gained.tensor_split(parts), size)
+            self._pool.map(
+                backward, self.policies, rows.tensor_split(parts), advantage.tensor_split(parts), size
+            )
         )
         for other in others:
             for one, more in zip(own, other.parameters(), strict=True):

@@ -13,7 +13,7 @@ _LARGEST: Final = 1 << 30
 
 
 def prepare_process() -> None:
-    """Nothing; sets PyTorch and the C library to what learning is quick with, for the whole process.
+    """Set PyTorch and the C library to what learning is quick with, for the whole process.
 
     PyTorch stays on one thread, as our own threads share out the work, and GPUs multiply in TF32, as they
     do convolutions anyway.
@@ -24,7 +24,7 @@ def prepare_process() -> None:
 
 
 def _keep_freed_memory() -> None:
-    """Nothing; memory that is freed stays with the process, where the C library is one that can be told.
+    """Keep memory that is freed with the process, where the C library is one that can be told.
 
     Every layer of every minibatch takes and frees some megabytes. By default glibc gives them back to the
     system each time, which then fills them with zeros again: a seventh of the time of an update.

@@ -12,13 +12,13 @@ from galley.errors import GalleyError
 from galley.evaluation.game_graph import PayoffTable
 from galley.kitchen.layout_file import find_layout
 from galley.learning.methods.milestones import CHECKPOINTS
+from galley.learning.policy_files import finished_run, load_policy
 from galley.learning.ppo.forwards import Machine
 from galley.learning.ppo.games import games_among
-from galley.learning.run_folder import load_policy, run_asked
 from galley.workspace import Workspace
 
 
-def run_payoffs(
+def checkpoint_payoffs(
     workspace: Path,
     run: Path,
     *,
@@ -37,7 +37,7 @@ def run_payoffs(
     Raises:
         GalleyError: there is no finished run in the folder, or fewer than two checkpoints.
     """
-    layout = find_layout(Workspace(workspace), run_asked(run)["layout"])
+    layout = find_layout(Workspace(workspace), finished_run(run)["layout"])
     names = sorted(path.stem for path in (run / "members").glob("[0-9][0-9][0-9][0-9].pt"))
     if len(names) < 2:
         raise GalleyError(f"{run}: has {len(names)} checkpoints; comparing takes at least 2")
