@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from galley.agents.batch import act_all  # noqa: E402
+from galley.agents.agent_batch import act_all  # noqa: E402
 from galley.agents.choosing import choose  # noqa: E402
 from galley.agents.network import Network, NetworkAgent  # noqa: E402
 from galley.compiled.randomness import uniform  # noqa: E402

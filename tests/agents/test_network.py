@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from galley.agents.batch import act_all
+from galley.agents.agent_batch import act_all
 from galley.agents.network import NetworkAgent
 from galley.agents.protocol import Agent
 from galley.agents.scripted import Random, Stay

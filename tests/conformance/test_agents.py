@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from galley.agents.batch import act_all
+from galley.agents.agent_batch import act_all
 from galley.agents.catalogue import Catalogue
 from galley.agents.conformance import check
 from galley.agents.episode import play_episode

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from galley.agents.batch import batch_of
+from galley.agents.agent_batch import batch_of
 from galley.agents.bundle import Bundle
 from galley.agents.protocol import Agent
 from galley.kitchen import Kitchen, KitchenBatch, Layout

@@ -13,14 +13,14 @@ class Stay:
     """An agent that never moves."""
 
     def reset(self, layout: Layout, seat: int, seed: int) -> None:
-        """Nothing to remember."""
+        """Begin an episode; there is nothing to forget."""
 
     def act(self, state: NDArray[int16], tick: int) -> int:
         """Always to stay."""
         return STAY
 
     def observe(self, state: NDArray[int16], joint_action: tuple[int, int]) -> None:
-        """Nothing to note."""
+        """Take no note: nothing hangs on it."""
 
 
 class Random:
@@ -38,4 +38,4 @@ class Random:
         return int(uniform(self._seed, self._seat, tick) * len(ACTIONS))
 
     def observe(self, state: NDArray[int16], joint_action: tuple[int, int]) -> None:
-        """Nothing to note."""
+        """Take no note: nothing hangs on it."""

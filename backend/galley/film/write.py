@@ -36,9 +36,10 @@ def can_draw() -> bool:
 
 
 def check(out: Path, tile: int, speed: float) -> None:
-    """Nothing, if a film can be written so.
+    """Make sure that a film can be written so.
 
-    Raises: GalleyError naming what cannot be and what can.
+    Raises:
+        GalleyError: it cannot; the message says what can.
     """
     if not can_draw():
         raise GalleyError(EXTRA)
@@ -65,7 +66,8 @@ def frames(
 def write_film(footage: Footage, sprites: Path, out: Path, tile: int = USUAL_TILE, speed: float = 1.0) -> int:
     """Pictures written to `out`, a .gif or .mp4; `sprites` is the folder of the browser's drawings.
 
-    Raises: GalleyError if the file cannot be written so; nothing is left of it then.
+    Raises:
+        GalleyError: the file cannot be written so; nothing is left of it then.
     """
     check(out, tile, speed)
     try:

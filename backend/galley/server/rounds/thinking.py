@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from galley.agents.batch import act_all
+from galley.agents.agent_batch import act_all
 from galley.agents.protocol import Agent
 from galley.kitchen import ACTIONS, Layout
 

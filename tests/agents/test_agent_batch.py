@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from galley.agents.batch import OneByOne, batch_of
+from galley.agents.agent_batch import OneByOne, batch_of
 from galley.agents.bundle import Bundle, load_bundle
 from galley.agents.network import NetworkAgent, NetworkAgents
 from galley.errors import GalleyError
