@@ -6,9 +6,9 @@ from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
+from galley.outcomes import VISIT_OUTCOMES
 from galley.server.templates import translated_templates
 from galley.study.written.questionnaire import Questionnaire
-from galley.study.written.recruitment import VISIT_OUTCOMES
 
 FRONTEND = Path(__file__).parents[2] / "frontend"
 HOSTILE = "<script>alert(1)</script>\"'><img src=x onerror=alert(1)>"

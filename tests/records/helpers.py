@@ -11,15 +11,18 @@ import numpy as np
 from galley.kitchen import Kitchen, Layout
 from galley.records import ClockRow, KeyRow, PauseRow, Store, TickRow, VisitRow
 from galley.records.reading.round_replay import state_bytes
-from galley.study.visit.plan import Plan, Step
+from galley.study.stages.kinds import ComparisonStep, ConsentStep, DebriefStep, Side
+from galley.study.stages.round_step import RoundStep
+from galley.study.visit.plan import Plan
+from galley.study.visit.steps import QuestionnaireStep
 
 START_MS = 1_760_000_000_000
 TINY = Layout.from_ascii("tiny", "XXPXX\nO  2O\nX1  X\nXDXSX", horizon_ticks=40)
 
 
-def round_data(round_no: int, **changes: Any) -> dict[str, Any]:
-    """The data of a round's step as a plan holds it."""
-    return {
+def round_step(step_id: str, title: str, round_no: int, **changes: Any) -> RoundStep:
+    """The step of a round as a plan holds it."""
+    usual: dict[str, Any] = {
         "round_no": round_no,
         "of": 2,
         "layout": TINY.name,
@@ -34,23 +37,29 @@ def round_data(round_no: int, **changes: Any) -> dict[str, Any]:
         "tutorial": False,
         "scored": True,
         "skippable": False,
-    } | changes
+    }
+    return RoundStep(id=step_id, title=title, **(usual | changes))
 
 
 def plan(visit_no: int = 0) -> Plan:
     """A plan with every kind of step the exports tell apart."""
     after = {"questionnaire": "after", "round_no": 1, "partner_hat": "orange", "human_hat": "blue"}
-    two = {"first": {"hat": "orange", "agent": "chef-a"}, "second": {"hat": "yellow", "agent": "chef-b"}}
+    first, second = Side(hat="orange", agent="chef-a"), Side(hat="yellow", agent="chef-b")
     steps = (
-        Step("consent", "consent", "Consent", {"text": "consent", "sha256": "c" * 64}),
-        Step("tutorial", "round", "Practice", round_data(0, tutorial=True, goal=None)),
-        Step("rounds-1", "round", "Round 1", round_data(1)),
-        Step("rounds-1-questions", "questionnaire", "After", after),
-        Step(
-            "rounds-2", "round", "Round 2", round_data(2, agent="chef-b", partner_hat="yellow", human_seat=0)
+        ConsentStep(id="consent", title="Consent", text="consent", sha256="c" * 64),
+        round_step("tutorial", "Practice", 0, tutorial=True, goal=None),
+        round_step("rounds-1", "Round 1", 1),
+        QuestionnaireStep(id="rounds-1-questions", title="After", **after),
+        round_step("rounds-2", "Round 2", 2, agent="chef-b", partner_hat="yellow", human_seat=0),
+        ComparisonStep(
+            id="comparison",
+            title="Compare",
+            questionnaire="compare",
+            human_hat="blue",
+            first=first,
+            second=second,
         ),
-        Step("comparison", "comparison", "Compare", {"questionnaire": "compare", "human_hat": "blue", **two}),
-        Step("debrief", "debrief", "Thank you", {"completion_code": "DONE"}),
+        DebriefStep(id="debrief", title="Thank you", completion_code="DONE"),
     )
     hats = {"chef-a": "orange", "chef-b": "yellow"}
     return Plan("demo", "d" * 64, visit_no, 7, {"arm": "a"}, hats, steps)
@@ -67,20 +76,20 @@ def begin(store: Store, study: str = "demo", **link_params: str) -> VisitRow:
 
 def open_round(store: Store, visit: VisitRow, step_id: str = "rounds-1", layout: Layout = TINY) -> int:
     """The id of the visit's round at a step of `plan`."""
-    data = next(step.data for step in plan().steps if step.id == step_id)
+    step = next(step for step in plan().steps if isinstance(step, RoundStep) and step.id == step_id)
     return store.create_round(
         visit.id,
         step_id,
-        data["round_no"],
+        step.round_no,
         json.dumps(layout.to_dict()),
-        data["layout"],
+        step.layout,
         layout.rules.horizon_ticks,
-        data["tick_ms"],
-        data["human_seat"],
-        data["agent"],
+        step.tick_ms,
+        step.human_seat,
+        step.agent,
         "a" * 64,
-        data["partner_hat"],
-        data["seed"],
+        step.partner_hat,
+        step.seed,
         START_MS,
     ).result()
 

@@ -70,9 +70,9 @@ def test_hats_and_agents_are_independent() -> None:
     first: Counter[tuple[str, str]] = Counter()
     for number in range(ASSIGNMENTS):
         plan = plan_visit(study, visit_seed(study, number), number)
-        rounds = [step.data for step in plan.steps if step.kind == "round" and step.data["round_no"]]
-        wears.update({(data["agent"], data["partner_hat"]) for data in rounds})
-        first[rounds[0]["agent"], rounds[0]["partner_hat"]] += 1
+        rounds = [step for step in plan.steps if step.kind == "round" and step.round_no]
+        wears.update({(step.agent, step.partner_hat) for step in rounds})
+        first[rounds[0].agent, rounds[0].partner_hat] += 1
     assert sum(wears.values()) == 2 * ASSIGNMENTS
     assert chi_square(wears) < CHI_SQUARE_6
     assert chi_square(first) < CHI_SQUARE_6

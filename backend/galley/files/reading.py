@@ -70,6 +70,52 @@ def faults(problems: Iterable[tuple[Loc, str, str]]) -> PydanticCustomError:
     return PydanticCustomError("galley", "{told}", {"told": told, "problems": listed})
 
 
+@dataclass(frozen=True)
+class Document:
+    """The keys and values of a file, not looked at by any model yet; `problems` are those of its text."""
+
+    data: dict[str, Any]
+    path: str
+    lines: Mapping[Loc, int]
+    text_lines: Mapping[Loc, int]
+    problems: tuple[Problem, ...]
+
+    def validated(self, model: type[M], context: Mapping[str, Any] | None = None) -> Loaded[M]:
+        """The file as a validated `model`; validators get `context`.
+
+        Raises:
+            InvalidFiles: everything that is wrong with the file.
+        """
+        try:
+            text = json.dumps(self.data)
+            value = model.model_validate_json(text, strict=True, context=dict(context or {}))
+        except pydantic.ValidationError as error:
+            found = [
+                Problem(self.path, _line(self.lines, loc), message, fix)
+                for loc, message, fix in explain(error, model, self.data)
+            ]
+            raise InvalidFiles([*self.problems, *found]) from None
+        if self.problems:
+            raise InvalidFiles(self.problems)
+        return Loaded(value, self.path, self.lines, self.text_lines)
+
+
+def read(path: Path, shown: str | None = None) -> Document:
+    """The file at `path` as plain keys and values; messages call it `shown`.
+
+    Raises:
+        InvalidFiles: the file is unreadable, not YAML, or holds no keys.
+    """
+    name = shown or path.as_posix()
+    root = _compose(path, name)
+    tree = _Tree(name)
+    data = tree.value(root, ())
+    if not isinstance(data, dict):
+        fix = "write `key: value` lines"
+        raise InvalidFiles([Problem(name, 1, "the file must hold keys and values at its top level", fix)])
+    return Document(data, name, tree.lines, tree.text_lines, tuple(tree.problems))
+
+
 def load(
     path: Path, model: type[M], shown: str | None = None, context: Mapping[str, Any] | None = None
 ) -> Loaded[M]:
@@ -79,24 +125,7 @@ def load(
         InvalidFiles: everything that is wrong with the file: unreadable, not YAML, keys doubled, unknown or
             missing, values of a wrong type or out of range, and whatever the model's validators refuse.
     """
-    name = shown or path.as_posix()
-    root = _compose(path, name)
-    tree = _Tree(name)
-    data = tree.value(root, ())
-    if not isinstance(data, dict):
-        fix = "write `key: value` lines"
-        raise InvalidFiles([Problem(name, 1, "the file must hold keys and values at its top level", fix)])
-    try:
-        value = model.model_validate_json(json.dumps(data), strict=True, context=dict(context or {}))
-    except pydantic.ValidationError as error:
-        found = [
-            Problem(name, _line(tree.lines, loc), message, fix)
-            for loc, message, fix in explain(error, model, data)
-        ]
-        raise InvalidFiles([*tree.problems, *found]) from None
-    if tree.problems:
-        raise InvalidFiles(tree.problems)
-    return Loaded(value, name, tree.lines, tree.text_lines)
+    return read(path, shown).validated(model, context)
 
 
 def _line(lines: Mapping[Loc, int], loc: Loc) -> int:

@@ -10,12 +10,14 @@ from typing import Any
 
 import orjson
 
+from galley.outcomes import ROUND_OUTCOMES
+
 PROTOCOL = 1
 MAX_MESSAGE_CHARS = 1024
 KEYS = ("up", "down", "left", "right", "interact")
 RELEASE_REASONS = ("blur", "hidden", "shown", "pagehide")
 PHASES = ("waiting", "countdown", "playing", "paused", "ended")
-OUTCOMES = ("finished", "abandoned", "skipped", "partner_left")
+OUTCOMES = (*ROUND_OUTCOMES, "partner_left")
 SHOW_SCORE = ("during", "after", "never")
 INPUT_MODES = ("hold", "press")
 PARTNERS = ("agent", "human", "none")

@@ -12,6 +12,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from galley.outcomes import RoundStatus, VisitStatus
 from galley.study.visit.condition_slots import Slot
 
 
@@ -30,7 +31,7 @@ class VisitRow:
     condition: dict[str, Any]
     link_params: dict[str, str]
     step_index: int
-    status: str
+    status: VisitStatus
     completion_code: str | None
     created_ms: int
     ended_ms: int | None
@@ -79,6 +80,10 @@ class SlotRow(Slot):
     visit_id: int | None
 
 
+NoRoom = Literal["full", "later", "paused", "closed"]
+"""Why a study takes no visit."""
+
+
 @dataclass(frozen=True, slots=True)
 class Begun:
     """What came of an arrival: a visit, or why there is none.
@@ -88,7 +93,7 @@ class Begun:
     """
 
     visit: VisitRow | None
-    why: Literal["new", "again", "full", "later", "paused", "closed"]
+    why: Literal["new", "again"] | NoRoom
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,7 +150,7 @@ class RoundRow:
     horizon_ticks: int
     tick_ms: int
     seed: int
-    status: str
+    status: RoundStatus
     score: int | None
     deliveries: int | None
     final_sha256: str | None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from galley.agents.catalogue import Catalogue
 from galley.agents.episode import play_episode
@@ -13,6 +12,7 @@ from galley.errors import GalleyError
 from galley.kitchen import Layout, warm
 from galley.kitchen.layout_file import load_layouts
 from galley.server.rounds.set_up import round_layout
+from galley.study.stages.round_step import RoundStep
 from galley.study.study import Study, load_study
 from galley.study.visit.condition_slots import cells
 from galley.study.visit.plan import plan_visit, visit_seed
@@ -21,7 +21,6 @@ from galley.workspace import Workspace
 REHEARSED_TICKS = 3
 REHEARSED_VISITS = 64
 REHEARSED_PER_CELL = 8
-NO_AGENTS = (None, "exit", "go_on", "end_round")
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,10 +64,10 @@ def _rehearse(studies: Mapping[str, Study], layouts: Mapping[str, Layout], catal
         GalleyError: an agent cannot play on a layout; it names both.
     """
     met = {
-        (name, round_layout(layouts, data))
+        (name, round_layout(layouts, step))
         for study in studies.values()
-        for data in _rounds(study)
-        for name in _agents_of(data)
+        for step in _rounds(study)
+        for name in step.agents
     }
     for name, layout in sorted(met, key=lambda pair: (pair[0], pair[1].name)):
         bundle = catalogue.bundle(name)
@@ -86,16 +85,9 @@ def _rehearse(studies: Mapping[str, Study], layouts: Mapping[str, Layout], catal
             ) from error
 
 
-def _rounds(study: Study) -> Iterator[Mapping[str, Any]]:
-    """The settings of the rounds that visits meet: of some visits in each cell of the design."""
+def _rounds(study: Study) -> Iterator[RoundStep]:
+    """The rounds that visits meet: those of some visits in each cell of the design."""
     for number in range(min(REHEARSED_VISITS, REHEARSED_PER_CELL * len(cells(study.config)))):
         for step in plan_visit(study, visit_seed(study, number), number).steps:
-            if step.kind == "round":
-                yield step.data
-
-
-def _agents_of(data: Mapping[str, Any]) -> set[str]:
-    """Every agent that may play a round, those that stand in for a person included."""
-    lobby = data.get("lobby", {})
-    names = {data["agent"], lobby.get("fallback"), lobby.get("dropout")}
-    return {name for name in names if name not in NO_AGENTS}
+            if isinstance(step, RoundStep):
+                yield step

@@ -6,14 +6,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from galley.errors import InvalidFiles, Problem
-from galley.files.reading import Loaded, load
+from galley.files.reading import Document, Loaded, read
 from galley.kitchen import Layout
+from galley.outcomes import VisitOutcome
 from galley.study.estimate import estimated_minutes, text_values
-from galley.study.visit.steps import Step
+from galley.study.visit.steps import QuestionsStep
 from galley.study.written.crosscheck import agent_problems, kitchen_problems, questionnaire_problems
 from galley.study.written.named_files import content_sha256, known_layouts_of, text_file
 from galley.study.written.questionnaire import Questionnaire, load_questionnaire
-from galley.study.written.recruitment import Ending, Outcome, filled, kept, load_invitations
+from galley.study.written.recruitment import Ending, filled, kept, load_invitations
 from galley.study.written.study_file import StudyFile, names_of
 from galley.study.written.texts import PageText, load_text
 from galley.workspace import Kind, Workspace
@@ -40,6 +41,7 @@ class Study:
     language: str = "en"
     invitations: frozenset[str] | None = None
     translations: Mapping[str, Study] = field(default_factory=dict, repr=False, compare=False)
+    """The study in each of its languages, by code."""
 
     @property
     def title(self) -> str:
@@ -70,13 +72,12 @@ class Study:
         """The same study with every word in one of its languages; the study itself for any other code."""
         return self.translations.get(code, self)
 
-    def questionnaire_for(self, step: Step) -> Questionnaire:
+    def questionnaire_for(self, step: QuestionsStep) -> Questionnaire:
         """The questionnaire of a step, its items in the order that the visit's plan gives them."""
-        questionnaire = self.questionnaires[step.data["questionnaire"]]
-        order = step.data.get("item_order")
-        return questionnaire if order is None else questionnaire.arranged(order)
+        questionnaire = self.questionnaires[step.questionnaire]
+        return questionnaire if step.item_order is None else questionnaire.arranged(step.item_order)
 
-    def ending(self, outcome: Outcome, link_params: Mapping[str, str]) -> Ending:
+    def ending(self, outcome: VisitOutcome, link_params: Mapping[str, str]) -> Ending:
         """What a visit that ended so is shown; its redirect carries the code and the link's parameters."""
         if outcome == "completed":
             done = self.config.completion
@@ -103,24 +104,23 @@ def load_study(workspace: Workspace, name: str) -> Study:
     context: dict[str, tuple[str, ...]] = {"layouts": known_layouts}
     context |= {kind: workspace.names(kind) for kind in CHECKED_KINDS}
     try:
-        loaded = load(path, StudyFile, workspace.shown(path), context)
+        document = read(path, workspace.shown(path))
+        loaded = document.validated(StudyFile, context)
     except InvalidFiles as invalid:
         raise InvalidFiles([*problems, *invalid.problems]) from None
     problems += agent_problems(workspace, loaded, layouts)
     problems += kitchen_problems(loaded, layouts)
     invitations = _invitations(workspace, loaded.value, problems)
     used = {n: layouts[n] for n in names_of(loaded.value, "layouts") if n in layouts}
-    spoken = [
-        _Reader(workspace, name, code, loaded.value.languages, problems).study(
-            context, layouts, used, invitations
-        )
-        for code in loaded.value.languages
-    ]
-    if problems or None in spoken:
+    sha256 = content_sha256(workspace, name, loaded.value, used.values())
+    studies: dict[str, Study] = {}
+    for code in loaded.value.languages:
+        reader = _Reader(workspace, code, loaded.value.languages, layouts, problems)
+        found = reader.parts(document, context)
+        if found is not None:
+            studies[code] = Study(name, *found, used, sha256, code, invitations, studies)
+    if problems:
         raise InvalidFiles(problems)
-    studies = {study.language: study for study in spoken if study is not None}
-    for study in studies.values():
-        object.__setattr__(study, "translations", studies)
     return next(iter(studies.values()))
 
 
@@ -129,23 +129,18 @@ class _Reader:
     """Reads a study and what it names in one language; what is wrong joins `problems`."""
 
     workspace: Workspace
-    name: str
     language: str
     languages: tuple[str, ...]
+    layouts: Mapping[str, Layout]
     problems: list[Problem]
 
-    def study(
-        self,
-        context: Mapping[str, tuple[str, ...]],
-        layouts: Mapping[str, Layout],
-        used: Mapping[str, Layout],
-        invitations: frozenset[str] | None,
-    ) -> Study | None:
-        """The study in this language, or None when its file says something wrong in it."""
-        path = self.workspace.find("studies", self.name)
+    def parts(
+        self, document: Document, context: Mapping[str, tuple[str, ...]]
+    ) -> tuple[StudyFile, dict[str, Questionnaire], dict[str, PageText]] | None:
+        """The study file, questionnaires and texts; None when the file is wrong in this language."""
         spoken = {"language": self.language, "languages": self.languages}
         try:
-            loaded = load(path, StudyFile, self.workspace.shown(path), {**context, **spoken})
+            loaded = document.validated(StudyFile, {**context, **spoken})
         except InvalidFiles as invalid:
             self.problems.extend(invalid.problems)
             return None
@@ -159,14 +154,13 @@ class _Reader:
                 self.problems.extend(invalid.problems)
         self.problems.extend(questionnaire_problems(loaded, read))
         values = text_values(config, read)
-        grids = {name: layout.grid for name, layout in layouts.items()} or None
+        grids = {name: layout.grid for name, layout in self.layouts.items()} or None
         texts = {}
         for name in names_of(config, "texts"):
             text = self._text(loaded, name, grids, values)
             if text is not None:
                 texts[name] = text
-        sha256 = content_sha256(self.workspace, self.name, config, used.values())
-        return Study(self.name, config, read, texts, used, sha256, self.language, invitations)
+        return config, read, texts
 
     def _text(
         self,

@@ -15,6 +15,7 @@ from galley.records.reading.round_replay import state_bytes
 from galley.records.reading.verify import verify_study
 from galley.study.study import load_study
 from galley.study.visit.plan import plan_visit, visit_seed
+from galley.study.visit.steps import QuestionsStep
 from galley.study.written.questionnaire import validate_answers
 from tests.records.helpers import START_MS, tick_rows
 from tests.study.workspaces import short_workspace
@@ -50,31 +51,30 @@ def test_a_planned_visit_goes_through_the_records(tmp_path: Path) -> None:
             now = START_MS + 10_000 * place
             store.enter_step(visit.id, step.id, now).result()
             answers, asked = {}, None
-            if "questionnaire" in step.data:
-                asked = study.questionnaires[step.data["questionnaire"]]
+            if isinstance(step, QuestionsStep):
+                asked = study.questionnaires[step.questionnaire]
                 answers, problems = validate_answers(asked, filled(asked.items))
                 assert not problems
                 compared += step.kind == "comparison"
             if step.kind == "round":
-                data = step.data
-                layout = study.layouts[data["layout"]].with_rules(horizon_ticks=data["ticks"])
+                layout = study.layouts[step.layout].with_rules(horizon_ticks=step.ticks)
                 round_id = store.create_round(
                     visit.id,
                     step.id,
-                    data["round_no"],
+                    step.round_no,
                     json.dumps(layout.to_dict()),
                     layout.name,
                     layout.rules.horizon_ticks,
-                    data["tick_ms"],
-                    data["human_seat"],
-                    data["agent"],
+                    step.tick_ms,
+                    step.human_seat,
+                    step.agent,
                     "a" * 64,
-                    data["partner_hat"],
-                    data["seed"],
+                    step.partner_hat,
+                    step.seed,
                     now,
-                    human_hat=data["human_hat"],
+                    human_hat=step.human_hat,
                 ).result()
-                actions = np.random.default_rng(place).integers(0, 6, (data["ticks"], 2)).tolist()
+                actions = np.random.default_rng(place).integers(0, 6, (step.ticks, 2)).tolist()
                 kitchen = Kitchen(layout)
                 for a0, a1 in actions:
                     kitchen.step(a0, a1)
@@ -96,9 +96,9 @@ def test_a_planned_visit_goes_through_the_records(tmp_path: Path) -> None:
     assert [row["step"] for row in found["stages"]] == [step.id for step in plan.steps]
     rounds = [step for step in plan.steps if step.kind == "round"]
     assert [(row["step"], row["agent"], row["replays"]) for row in found["rounds"]] == [
-        (step.id, step.data["agent"], "true") for step in rounds
+        (step.id, step.agent, "true") for step in rounds
     ]
-    assert len(found["ticks"]) == sum(step.data["ticks"] for step in rounds)
+    assert len(found["ticks"]) == sum(step.ticks for step in rounds)
     assert compared
     for row in found["responses"]:
         assert row["text"]

@@ -13,9 +13,11 @@ from galley.kitchen import Kitchen, Layout
 from galley.kitchen.layout_file import load_layouts
 from galley.records import ClockRow, KeyRow, PauseRow, Store, TickRow, VisitRow
 from galley.records.rows import Arrival, NewRound, Planned, SeatRow
+from galley.study.stages.round_step import RoundStep
 from galley.study.study import Study
 from galley.study.visit.condition_slots import Issue, allocate
-from galley.study.visit.plan import Plan, Step, plan_visit, visit_seed
+from galley.study.visit.plan import Plan, plan_visit, visit_seed
+from galley.study.visit.steps import QuestionsStep, Step
 from galley.study.written.questionnaire import Questionnaire
 from galley.workspace import Workspace
 
@@ -110,7 +112,7 @@ class Pilot:
             ).result()
 
     def questions(self, step: Step) -> Questionnaire | None:
-        return self.study.questionnaire_for(step) if "questionnaire" in step.data else None
+        return self.study.questionnaire_for(step) if isinstance(step, QuestionsStep) else None
 
     def answers(self, questions: Questionnaire, text: str) -> dict[str, Any]:
         def one(item: Any) -> Any:
@@ -131,34 +133,33 @@ class Pilot:
         return {item.id: one(item) for item in questions.items}
 
     def round(
-        self, visit: VisitRow, step: Step, at: float, late: int, rtt_ms: float, ticks: int | None = None
+        self, visit: VisitRow, step: RoundStep, at: float, late: int, rtt_ms: float, ticks: int | None = None
     ) -> float:
         """Set up and play a round, to its end or for some ticks; gives when it was over."""
-        data = step.data
-        layout = self.layouts[data["layout"]].with_rules(horizon_ticks=data["ticks"])
-        seat = data["human_seat"]
-        person = SeatRow(seat, visit.id, step.id, hat=data["human_hat"])
-        agent = SeatRow(1 - seat, None, None, data["agent"], "a" * 64, data["partner_hat"])
+        layout = self.layouts[step.layout].with_rules(horizon_ticks=step.ticks)
+        seat = step.human_seat
+        person = SeatRow(seat, visit.id, step.id, hat=step.human_hat)
+        agent = SeatRow(1 - seat, None, None, step.agent, "a" * 64, step.partner_hat)
         round_id = self.store.set_up_round(
             NewRound(
-                data["round_no"],
+                step.round_no,
                 layout.name,
                 json.dumps(layout.to_dict()),
                 layout.rules.horizon_ticks,
-                data["tick_ms"],
-                data["seed"],
+                step.tick_ms,
+                step.seed,
                 at,
                 (person, agent) if seat == 0 else (agent, person),
             )
         ).result()
-        actions = self.game(layout, data["agent"], seat)[: ticks or data["ticks"]]
+        actions = self.game(layout, step.agent, seat)[: ticks or step.ticks]
         kitchen = Kitchen(layout)
         rows = []
         for tick, (first, second) in enumerate(actions):
             kitchen.step(first, second)
             missed = self.draw.random() < late / len(actions)
             decision = None if missed else self.draw.uniform(2, 9)
-            due = at + (tick + 1) * data["tick_ms"]
+            due = at + (tick + 1) * step.tick_ms
             rows.append(TickRow(tick, first, second, due, self.draw.uniform(0.1, 2), decision, missed))
         keys = [
             KeyRow(1, "up", True, 100.0, at + 150, 0, seat),
@@ -169,7 +170,7 @@ class Pilot:
         ]
         pauses = [PauseRow(40, at + 6000, at + 9000, "left")] if late else []
         self.store.journal(round_id, rows, keys, pauses, clocks)
-        over = at + len(actions) * data["tick_ms"]
+        over = at + len(actions) * step.tick_ms
         if ticks is None:
             end = (kitchen.score, int(kitchen.view.deliveries), over, kitchen.state.astype("<i2").tobytes())
             self.store.finish_round(round_id, "finished", *end).result()

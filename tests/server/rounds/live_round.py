@@ -171,7 +171,8 @@ class Round:
             raise self._finish_fails
         self.ends.append(outcome)
 
-    async def stand_in(self, match: Match, person: Person) -> Any:
+    async def stand_in(self, match: Match, person: Person, agent: str) -> Any:
+        assert agent == match.spec.stand_in
         return self.mind
 
     def forget(self, match: Match) -> None:

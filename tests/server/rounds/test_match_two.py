@@ -91,7 +91,7 @@ def test_a_drop_out_ends_the_round_for_the_other_who_is_told(leaver: int) -> Non
 
 def test_an_agent_takes_the_seat_of_a_drop_out_and_the_round_goes_on() -> None:
     async def test() -> None:
-        round_ = Round(people=2, partner="human", dropout="myopic")
+        round_ = Round(people=2, partner="human", stand_in="myopic")
         one, two = await both_playing(round_, 5)
         round_.match.leave(two)
         await until_tick(round_, 20)
@@ -107,7 +107,7 @@ def test_an_agent_takes_the_seat_of_a_drop_out_and_the_round_goes_on() -> None:
 
 def test_when_both_are_gone_the_round_is_abandoned_whatever_the_study_says_of_drop_outs() -> None:
     async def test() -> None:
-        round_ = Round(people=2, partner="human", dropout="myopic")
+        round_ = Round(people=2, partner="human", stand_in="myopic")
         one, two = await both_playing(round_, 5)
         round_.match.leave(two)
         round_.match.leave(one)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,22 +12,19 @@ from hypothesis import strategies as st
 
 from galley.errors import InvalidFiles
 from galley.study.study import Study, load_study
-from galley.study.visit.plan import Plan, plan_visit
-from galley.study.visit.progress import (
+from galley.study.visit.happenings import (
     Agreed,
     Continued,
     Ended,
-    Progress,
-    Refusal,
     RoundEnded,
     Skipped,
     Submitted,
     TimedOut,
-    failed_attention,
-    next_progress,
-    position,
 )
+from galley.study.visit.plan import Plan, plan_visit
+from galley.study.visit.progress import Progress, Refusal, failed_attention, next_progress, position
 from galley.study.written.factors import Condition
+from galley.study.written.recruitment import Attention
 from tests.study.workspaces import study_workspace
 
 STUDY = """\
@@ -174,7 +172,7 @@ def test_too_many_failed_attention_checks_end_the_visit(plan: Plan) -> None:
     assert failed_attention(plan, visit.answers) == (("survey", "check"),)
     visit.answer(**RIGHT).do(Continued("break")).do(Skipped("load")).do(RoundEnded("rounds-1", "finished"))
     assert visit.answer(age=20, played="yes", check=1).progress.status == "failed_checks"
-    flagging = Plan(**{**vars(plan), "attention": {"allowed": 0, "then": "flag"}})
+    flagging = replace(plan, attention=Attention(allowed=0, then="flag"))
     again = Visit(flagging).do(Agreed("consent")).answer(age=20, played="yes", check=5)
     assert again.progress.status == "active"
 

@@ -7,38 +7,45 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from galley.study.visit.plan import STEP_KINDS, Plan, Step, StepKind
-from galley.study.visit.progress import (
-    OUTCOMES,
+from galley.outcomes import ROUND_OUTCOMES
+from galley.study.stages.kinds import STEP_TYPES
+from galley.study.visit.happenings import (
     Agreed,
     Continued,
     Declined,
     Ended,
     Happening,
-    Progress,
-    Refusal,
     RoundEnded,
     Skipped,
     Submitted,
     TimedOut,
-    next_progress,
 )
+from galley.study.visit.plan import Plan
+from galley.study.visit.progress import Progress, Refusal, next_progress
+from galley.study.visit.steps import Step
+from tests.study.stages.kinds import KINDS as STAGES
+from tests.study.stages.kinds import rounds_end
 
-KINDS: tuple[StepKind, ...] = (
-    "consent", "questionnaire", "instructions", "round", "round", "questionnaire", "comparison", "quiz",
-    "break", "debrief",
-)  # fmt: skip
+STEP_KINDS = tuple(STEP_TYPES)
+MIDDLE = [kind for kind in STEP_KINDS if kind not in ("consent", "debrief", "screen_out")]
+KINDS = ("consent", *MIDDLE, "round", "questionnaire", "debrief")
 
 
-def plan_of(*kinds: StepKind) -> Plan:
+def plan_of(*kinds: str) -> Plan:
     steps = []
+    skippable = next((number for number, kind in enumerate(kinds) if kind == "round"), None)
     for number, kind in enumerate(kinds):
-        data: dict[str, Any] = {"skippable": number == 3} if kind == "round" else {}
+        data: dict[str, Any] = dict(next(one for one in STAGES.values() if one.step == kind).stored)
+        for rule in ("time_limit_s", "at_limit"):
+            data.pop(rule, None)
+        data["skippable"] = number == skippable
+        if kind == "round":
+            data["seed"] = number
         if kind == "quiz":
-            data = {"tries": 2, "after_last": "end", "expected": {"q": 1}}
+            data |= {"tries": 2, "after_last": "end", "expected": {"q": 1}}
         if kind == "screen_out":
-            data = {"when": [{"item": "s0.never", "any_of": [1]}]}
-        steps.append(Step(f"s{number}", kind, "", data))
+            data["when"] = [{"item": "s0.never", "any_of": [1]}]
+        steps.append(STEP_TYPES[kind].model_validate({"id": f"s{number}", "title": "", **data}))
     return Plan("study", "", 0, 0, {}, {}, tuple(steps))
 
 
@@ -51,7 +58,7 @@ def all_happenings(step_id: str) -> list[Happening]:
         Declined(step_id),
         Submitted(step_id),
         Continued(step_id),
-        *(RoundEnded(step_id, outcome) for outcome in OUTCOMES),
+        *(RoundEnded(step_id, outcome) for outcome in ROUND_OUTCOMES),
         RoundEnded(step_id, "lost"),  # type: ignore[arg-type]
         Skipped(step_id),
         TimedOut(step_id),
@@ -61,18 +68,9 @@ def all_happenings(step_id: str) -> list[Happening]:
 
 def legal(step: Step) -> list[Happening]:
     """What the contract allows at a step, written out once more."""
-    match step.kind:
-        case "consent":
-            return [Agreed(step.id), Declined(step.id)]
-        case "questionnaire" | "comparison" | "quiz":
-            return [Submitted(step.id)]
-        case "instructions" | "break":
-            return [Continued(step.id)]
-        case "round":
-            ended: list[Happening] = [RoundEnded(step.id, "finished"), RoundEnded(step.id, "abandoned")]
-            return [*ended, RoundEnded(step.id, "skipped")] if step.data["skippable"] else ended
-        case _:
-            return []
+    if step.kind == "round":
+        return rounds_end(step.id, skippable=step.skippable)
+    return next(kind for kind in STAGES.values() if kind.step == step.kind).ends(step.id)
 
 
 def test_every_happening_at_every_step_does_what_the_contract_says() -> None:
@@ -146,8 +144,7 @@ def test_the_straight_way_through_ends_at_the_debrief() -> None:
 
 
 def test_any_two_kinds_in_a_row_work() -> None:
-    middle = [kind for kind in STEP_KINDS if kind not in ("consent", "debrief", "screen_out")]
-    for one, other in product(middle, middle):
+    for one, other in product(MIDDLE, MIDDLE):
         plan = plan_of("consent", one, other, "debrief")
         progress = Progress()
         while progress.status == "active":

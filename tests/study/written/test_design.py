@@ -9,9 +9,11 @@ import pytest
 
 from galley.errors import InvalidFiles
 from galley.study.describe import describe
+from galley.study.stages.round_step import Bonus, Goal
 from galley.study.study import Study, load_study
 from galley.study.visit.condition_slots import cell_number, cells
-from galley.study.visit.plan import Plan, Step, plan_visit, visit_seed
+from galley.study.visit.plan import Plan, plan_visit, visit_seed
+from galley.study.visit.steps import Step
 from galley.workspace import Workspace
 from tests.study.workspaces import ROOT, study_workspace
 
@@ -46,11 +48,11 @@ def plans(study: Study, count: int) -> list[Plan]:
 
 
 def rounds(plan: Plan) -> list[Step]:
-    return [step for step in plan.steps if step.kind == "round" and not step.data["tutorial"]]
+    return [step for step in plan.steps if step.kind == "round" and not step.tutorial]
 
 
 def met(plan: Plan, key: str) -> tuple[object, ...]:
-    return tuple(step.data[key] for step in rounds(plan))
+    return tuple(getattr(step, key) for step in rounds(plan))
 
 
 def test_cole_pairs_everyone_meets_the_focal_agent_and_one_baseline_on_every_layout() -> None:
@@ -69,11 +71,11 @@ def test_cole_pairs_everyone_meets_the_focal_agent_and_one_baseline_on_every_lay
         assert met(plan, "layout") == tuple(layout for layout in order for _ in range(2))
         pairs = [met(plan, "agent")[n : n + 2] for n in range(0, 10, 2)]
         assert all(set(pair) == {"cole-sv", baseline} for pair in pairs)
-        assert all(len({step.data["human_seat"] for step in rounds(plan)[n : n + 2]}) == 1 for n in (0, 4, 8))
+        assert all(len({step.human_seat for step in rounds(plan)[n : n + 2]}) == 1 for n in (0, 4, 8))
         first += sum(pair[0] == "cole-sv" for pair in pairs)
         comparison = next(step for step in plan.steps if step.kind == "comparison")
-        assert {comparison.data[which]["agent"] for which in ("first", "second")} == {"cole-sv", baseline}
-        assert rounds(plan)[0].data["bonus"] == {"amount": 5.0, "unit": "CNY"}
+        assert {comparison.first.agent, comparison.second.agent} == {"cole-sv", baseline}
+        assert rounds(plan)[0].bonus == Bonus(amount=5.0, unit="CNY")
     assert set(Counter(plan.condition["baseline"] for plan in given).values()) == {40}
     drawn = 5 * len(given)
     assert abs(first - drawn / 2) < 4.5 * (drawn / 4) ** 0.5
@@ -101,7 +103,7 @@ def test_lsi_everyone_meets_twelve_kitchens_in_an_order_of_their_own() -> None:
         assert set(met(plan, "layout")) == names
         assert set(met(plan, "human_seat")) == {1}
         assert set(met(plan, "ticks")) == {150}
-        tutorials = [step.data["partner"] for step in plan.steps if step.data.get("tutorial")]
+        tutorials = [step.partner for step in plan.steps if step.kind == "round" and step.tutorial]
         assert tutorials == ["none", "none", "agent"]
         places[met(plan, "layout").index("lsi_low_team_fluency_1")] += 1
     assert len({met(plan, "layout") for plan in given}) > 290
@@ -181,7 +183,7 @@ def test_each_layout_once_with_one_agent_by_latin_square(tmp_path: Path) -> None
     )
     assert len(both) == 9
     assert set(both.values()) == {10}
-    assert [step.data["of"] for step in rounds(given[0])] == [3, 3, 3]
+    assert [step.of for step in rounds(given[0])] == [3, 3, 3]
 
 
 def test_blocks_of_one_agent_play_all_layouts_first(tmp_path: Path) -> None:
@@ -201,7 +203,7 @@ def test_blocks_of_one_agent_play_all_layouts_first(tmp_path: Path) -> None:
         agents, layouts = met(plan, "agent"), met(plan, "layout")
         assert len(set(agents[:3])) == len(set(agents[3:])) == 1
         assert sorted(layouts[:3]) == sorted(layouts[3:])
-        seats = {(step.data["layout"], step.data["human_seat"]) for step in rounds(plan)}
+        seats = {(step.layout, step.human_seat) for step in rounds(plan)}
         assert len(seats) == 3
 
 
@@ -230,7 +232,7 @@ factors:
         instructions = [step for step in plan.steps if step.kind == "instructions"]
         assert len(instructions) == (condition["words"] == "instructions")
         asked = next(step for step in plan.steps if step.kind == "questionnaire")
-        assert asked.data["questionnaire"] == condition["asked"]
+        assert asked.questionnaire == condition["asked"]
         seen.add(tuple(condition.values()))
     assert len(seen) == 16
     assert study.agents == ("random", "myopic")
@@ -257,25 +259,25 @@ def test_rounds_carry_all_their_settings(tmp_path: Path) -> None:
     )
     plan = plan_visit(study, 1, 0)
     alone = plan.steps[1]
-    assert (alone.data["partner"], alone.data["agent"], alone.skippable) == ("none", "stay", True)
-    assert (len(alone.data["seeds"]), alone.data["show_score"]) == (2, "during")
+    assert (alone.partner, alone.agent, alone.skippable) == ("none", "stay", True)
+    assert (len(alone.seeds), alone.show_score) == (2, "during")
     first, second = rounds(plan)
-    assert (first.data["ticks"], first.data["tick_ms"], second.data["ticks"], second.data["tick_ms"]) == (
+    assert (first.ticks, first.tick_ms, second.ticks, second.tick_ms) == (
         70,
         200,
         50,
         100,
     )
-    assert first.data["goal"] == {"score": 60, "text": "Get 60 for 2.5 EUR!"}
-    assert first.data["bonus"] == {"amount": 2.5, "unit": "EUR"}
-    assert second.data["bonus"] is None
-    assert (first.data["input_mode"], first.data["show_score"], first.data["episodes"]) == (
+    assert first.goal == Goal(score=60, text="Get 60 for 2.5 EUR!")
+    assert first.bonus == Bonus(amount=2.5, unit="EUR")
+    assert second.bonus is None
+    assert (first.input_mode, first.show_score, first.episodes) == (
         "press",
         "after",
         3,
     )
-    assert first.data["seeds"][0] == first.data["seed"]
-    every = [seed for step in (alone, first, second) for seed in step.data["seeds"]]
+    assert first.seeds[0] == first.seed
+    every = [seed for step in (alone, first, second) for seed in step.seeds]
     assert len(set(every)) == len(every) == 8
 
 
@@ -295,12 +297,12 @@ def test_people_who_play_together_have_the_same_pairing_in_the_same_cell(tmp_pat
     given = plans(study, 8)
     together: dict[str, set[str]] = {}
     for plan in given:
-        person = rounds(plan)[0].data
+        person = rounds(plan)[0].stored()["data"]
         assert (person["partner"], person["agent"]) == ("human", None)
         assert person["lobby"] == {"wait_s": 30, "fallback": "random", "dropout": "myopic"}
         assert person["partner_hat"] == plan.hats["human"] != person["human_hat"]
-        assert "pairing" not in rounds(plan)[1].data
-        assert len({step.data["pairing"] for step in rounds(plan)[::2]}) == 3
+        assert "pairing" not in rounds(plan)[1].stored()["data"]
+        assert len({step.pairing for step in rounds(plan)[::2]}) == 3
         together.setdefault(plan.condition["arm"], set()).add(person["pairing"])
     assert {len(pairings) for pairings in together.values()} == {1}
     assert together["a"] != together["b"]
@@ -396,7 +398,7 @@ def combination(plan: Plan) -> tuple[object, ...]:
     baseline = plan.condition["baseline"]
     first = met(plan, "agent")[0] == baseline
     focal = next(hat for agent, hat in plan.hats.items() if agent != baseline)
-    hats = (rounds(plan)[0].data["human_hat"], focal, plan.hats[baseline])
+    hats = (rounds(plan)[0].human_hat, focal, plan.hats[baseline])
     return baseline, first, met(plan, "human_seat")[0], *hats
 
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from galley.study.scores import subscale_scores, wrong_items
-from galley.study.visit.plan import item_order
+from galley.study.visit.draft import item_order
 from galley.study.written.item_base import BaseItem
 from galley.study.written.items import Item, stored_item
 from galley.study.written.questionnaire import load_questionnaire, validate_answers

@@ -78,8 +78,8 @@ def test_the_plan_differs_in_words_only(study: Study) -> None:
     assert (en.language, zh.language) == ("en", "zh")
     assert [step.id for step in en.steps] == [step.id for step in zh.steps]
     assert (en.steps[2].title, zh.steps[2].title) == ("A round", "一局")
-    assert zh.steps[2].data["goal"]["text"] == "达到 20 分。"
-    assert en.steps[2].data["seed"] == zh.steps[2].data["seed"]
+    assert zh.steps[2].goal.text == "达到 20 分。"
+    assert en.steps[2].seed == zh.steps[2].seed
 
 
 def test_messages_go_through_gettext(study: Study) -> None:
@@ -99,7 +99,7 @@ def test_titles_of_rounds_go_through_gettext(tmp_path: Path) -> None:
     }
     step = plan_visit(study.in_language("zh"), 5, 0, say=lambda text: say.get(text, text)).steps[2]
     assert step.title == "第 1 局，共 1 局"
-    assert step.data["goal"]["text"] == "一起达到 20 分。"
+    assert step.goal.text == "一起达到 20 分。"
 
 
 @pytest.mark.parametrize(

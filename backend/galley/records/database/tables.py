@@ -8,7 +8,7 @@ Actions: 0 north, 1 south, 2 east, 3 west, 4 stay, 5 interact.
 from __future__ import annotations
 
 import json
-from typing import Any
+from typing import Any, Final, Literal, get_args
 
 from sqlalchemy import (
     BigInteger,
@@ -29,6 +29,8 @@ from sqlalchemy import (
 )
 from sqlalchemy.engine import Dialect
 from sqlalchemy.types import TypeEngine
+
+from galley.outcomes import ROUND_STATUSES, VISIT_STATUSES
 
 # Names given here, not by the database, so that a later migration can drop a constraint on any of them.
 METADATA = MetaData(
@@ -59,20 +61,9 @@ class Json(TypeDecorator[Any]):
 # SQLite only numbers rows by itself when the key's type is exactly INTEGER.
 _ROW_ID = BigInteger().with_variant(Integer, "sqlite")
 _Type = TypeEngine[Any] | type[TypeEngine[Any]]
-VISIT_STATUSES = (
-    "active",
-    "completed",
-    "declined",
-    "screened_out",
-    "failed_checks",
-    "timed_out",
-    "expired",
-    "partner_missing",
-    "abandoned",
-)
-STUDY_STATES = ("open", "paused", "closed")
+StudyState = Literal["open", "paused", "closed"]
+STUDY_STATES: Final[tuple[StudyState, ...]] = get_args(StudyState)
 SLOT_STATES = ("held", "completed")
-ROUND_STATUSES = ("open", "finished", "abandoned", "skipped")
 
 
 def _of(name: str, kind: _Type, meaning: str, *more: Any, **settings: Any) -> Column[Any]:

@@ -24,6 +24,7 @@ from galley.records.export.columns import (
 from galley.records.reading.round_replay import Replayed, replay_round
 from galley.records.rows import RoundRow
 from galley.records.store import queries
+from galley.study.stages.round_step import RoundStep
 
 Rows = Sequence[Mapping[str, Any]]
 
@@ -38,14 +39,12 @@ class TableFile(Protocol):
 class RoundExport:
     """Writes everything about one round that a visit played.
 
-    `settings` is the data of the step it was played at, `at` what the visit adds to every row.
+    `step` is the one it was played at, `at` what the visit adds to every row.
     """
 
-    def __init__(
-        self, connection: Connection, row: RoundRow, settings: Mapping[str, Any], at: Mapping[str, Any]
-    ) -> None:
+    def __init__(self, connection: Connection, row: RoundRow, step: RoundStep, at: Mapping[str, Any]) -> None:
         self.row = row
-        self.settings = settings
+        self.step = step
         self.at = {**at, "round_id": row.id, "round_no": row.round_no}
         self.human, self.partner = row.human, row.partner
         self.ticks: Rows = queries.of_round(connection, TICKS, row.id)
@@ -80,7 +79,7 @@ class RoundExport:
 
     def _round(self) -> dict[str, Any]:
         row = self.row
-        goal = (self.settings.get("goal") or {}).get("score")
+        goal = None if self.step.goal is None else self.step.goal.score
         lateness = [tick["lateness_ms"] for tick in self.ticks]
         decisions = [tick["decision_ms"] for tick in self.ticks if tick["decision_ms"] is not None]
         mine = (ping for ping in self.clocks if ping["seat"] == self.human.seat)
@@ -89,7 +88,7 @@ class RoundExport:
         paused = [p["ended_ms"] - p["started_ms"] for p in self.pauses if p["ended_ms"] is not None]
         return {
             **self.at,
-            "tutorial": bool(self.settings.get("tutorial")),
+            "tutorial": self.step.tutorial,
             "layout": row.layout,
             "layout_sha256": hashlib.sha256(row.layout_json.encode()).hexdigest(),
             "agent": self.partner.agent,
@@ -99,7 +98,7 @@ class RoundExport:
             "stand_in_seat": other and other.seat,
             "stand_in_tick": other and other.tick,
             "human_seat": self.human.seat,
-            "human_hat": self.human.hat or self.settings.get("human_hat"),
+            "human_hat": self.human.hat or self.step.human_hat,
             "partner_hat": self.partner.hat,
             "seed": row.seed,
             "horizon_ticks": row.horizon_ticks,

@@ -13,6 +13,7 @@ from sqlalchemy import Connection, func, select
 
 from galley.errors import GalleyError
 from galley.files.whole import write_whole
+from galley.outcomes import RoundStatus
 from galley.records.database.tables import ABSENCES, ATTEMPTS, NOTES, RESPONSES, STAGES
 from galley.records.export.columns import (
     ABSENCES_SHEET,
@@ -37,7 +38,10 @@ from galley.records.rows import RoundRow, VisitRow
 from galley.records.store import queries
 from galley.records.store.store import Store
 from galley.study.scores import subscale_scores
-from galley.study.visit.plan import Plan, Step
+from galley.study.stages.kinds import ComparisonStep
+from galley.study.stages.round_step import RoundStep
+from galley.study.visit.plan import Plan
+from galley.study.visit.steps import QuestionnaireStep, QuestionsStep, Step
 from galley.study.written.items import Item, stored_item
 
 FORMATS: Final[dict[str, type[PartFile]]] = {
@@ -122,12 +126,12 @@ class _Visit:
         }
 
     def write(self) -> None:
-        statuses = []
+        statuses: list[RoundStatus] = []
         for round_id in queries.rounds_of_visit(self.connection, self.visit.id):
             row = queries.round_row(self.connection, round_id)
-            step = self._step(next(str(s.step_id) for s in row.seats if s.visit_id == self.visit.id))
+            step = self._played_at(row)
             self.rounds[step.id] = row
-            if not step.data.get("tutorial"):
+            if not step.tutorial:
                 statuses.append(row.status)
             if row.human.visit_id == self.visit.id:  # a round for two is written with the other one
                 self._round(row, step)
@@ -160,14 +164,23 @@ class _Visit:
         hidden_ms = self.connection.execute(gone.where(ABSENCES.c.visit_id == self.visit.id)).scalar()
         return float(hidden_ms or 0) / 1000
 
+    def _played_at(self, row: RoundRow) -> RoundStep:
+        """The step of the visit that a round was played at."""
+        step = self._step(next(str(s.step_id) for s in row.seats if s.visit_id == self.visit.id))
+        if not isinstance(step, RoundStep):
+            raise ValueError(
+                f"round {row.id} stands at step '{step.id}' of visit {self.visit.id}, which is none"
+            )
+        return step
+
     def _step(self, step_id: str) -> Step:
         return self.plan.steps[self.places[step_id]]
 
-    def _round(self, row: RoundRow, step: Step) -> None:
+    def _round(self, row: RoundRow, step: RoundStep) -> None:
         at = {**self.who, "step_index": self.places[step.id], "step": step.id}
-        RoundExport(self.connection, row, step.data, at).write(self.files)
+        RoundExport(self.connection, row, step, at).write(self.files)
 
-    def _participant(self, statuses: list[str]) -> None:
+    def _participant(self, statuses: list[RoundStatus]) -> None:
         visit = self.visit
         self.files[PARTICIPANTS.name].write(
             {
@@ -228,7 +241,7 @@ class _Visit:
                 **self.who,
                 "step_index": self.places[step.id],
                 "step": step.id,
-                "questionnaire": step.data.get("questionnaire"),
+                "questionnaire": step.questionnaire if isinstance(step, QuestionsStep) else None,
                 **self._asked_about(step),
             }
             items = [stored_item(row["shown"]) for row in answers]
@@ -252,11 +265,11 @@ class _Visit:
     def _asked_about(self, step: Step) -> dict[str, Any]:
         """The round that a questionnaire follows; a comparison and a survey are about no single round."""
         names = ("round_no", "layout", "agent", "partner_hat")
-        if step.data.get("round_no") is None:
+        if not isinstance(step, QuestionnaireStep) or step.round_no is None:
             return dict.fromkeys(names)
         before = self.plan.steps[: self.places[step.id]]
-        played = next(s for s in reversed(before) if s.kind == "round")
-        about = {name: played.data.get(name) for name in names}
+        played = next(s for s in reversed(before) if isinstance(s, RoundStep))
+        about = {name: getattr(played, name) for name in names}
         row = self.rounds.get(played.id)
         if row is not None:  # the lobby may have found another partner than was planned
             about["agent"] = next(s.agent for s in row.seats if s.visit_id != self.visit.id)
@@ -266,9 +279,10 @@ class _Visit:
 def _response(step: Step, row: Mapping[str, Any], item: Item | None) -> dict[str, Any]:
     """What is told about one answer; little where the item that was shown is unknown."""
     shown, value = row["shown"] or {}, row["value"]
+    first, second = (step.first, step.second) if isinstance(step, ComparisonStep) else (None, None)
     sides: dict[str, Any] = {
-        f"{side}_{what}": step.data.get(side, {}).get(what)
-        for side in ("first", "second")
+        f"{name}_{what}": getattr(side, what, None)
+        for name, side in (("first", first), ("second", second))
         for what in ("agent", "hat")
     }
     preference = None if item is None else item.preference(value)

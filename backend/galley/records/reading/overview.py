@@ -16,6 +16,7 @@ from galley.records.reading.flags import Flag, flags
 from galley.records.reading.round_replay import nobody
 from galley.records.reading.timeline import TimelineEntry, timeline
 from galley.records.store.arrivals import slots
+from galley.study.visit.plan import Plan
 
 __all__ = [
     "AnswerRow",
@@ -218,9 +219,9 @@ def _steps(connection: Connection, study: str, wanted: Iterable[str]) -> list[tu
             .order_by(VISITS.c.id.desc())
             .limit(1)
         )
-        steps = json.loads(connection.execute(plan_with_one).scalar_one())["steps"]
+        steps = Plan.from_json(connection.execute(plan_with_one).scalar_one()).steps
         for place, step in enumerate(steps):
-            places.setdefault(step["id"], (place, step["title"], step["kind"]))
+            places.setdefault(step.id, (place, step.title, step.kind))
         places.setdefault(min(missing), (len(steps), "", ""))
         missing -= places.keys()
     found = sorted((places[step][0], step) for step in wanted)
@@ -297,7 +298,7 @@ def _summaries(
     return tuple(
         VisitSummary(
             **{name: row[name] for name in same},
-            step_id=json.loads(row["plan_json"])["steps"][row["step_index"]]["id"],
+            step_id=Plan.from_json(row["plan_json"]).steps[row["step_index"]].id,
             rounds=played.get(row["id"], 0),
             notes=noted.get(row["id"], 0),
             flags=with_flags.get(row["id"], ()),

@@ -19,7 +19,7 @@ from galley.kitchen.events import Event
 from galley.kitchen.measures import Measures, measures_of
 from galley.kitchen.trajectory import HUMAN, NOBODY, Replay, Seat, Trajectory, episodes_of, play
 from galley.records.rows import RoundRow, SeatRow
-from galley.study.written.study_file import ALONE_AGENT
+from galley.study.stages.round_step import ALONE_AGENT
 
 
 @dataclass(frozen=True, eq=False)

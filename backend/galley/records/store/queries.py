@@ -10,7 +10,16 @@ from numpy.typing import NDArray
 from sqlalchemy import Connection, Table, select
 
 from galley.errors import GalleyError
-from galley.records.database.tables import RESPONSES, ROUNDS, SEATS, STAND_INS, STUDIES, TICKS, VISITS
+from galley.records.database.tables import (
+    RESPONSES,
+    ROUNDS,
+    SEATS,
+    STAND_INS,
+    STUDIES,
+    TICKS,
+    VISITS,
+    StudyState,
+)
 from galley.records.rows import RoundRow, SeatRow, StandInRow, VisitRow
 
 
@@ -37,8 +46,8 @@ def visit(connection: Connection, token: str) -> VisitRow | None:
     return None if found is None else visit_row(dict(found))
 
 
-def study_state(connection: Connection, study: str) -> str:
-    """Whether a study takes new visits: open, paused or closed; one that nobody visited is open."""
+def study_state(connection: Connection, study: str) -> StudyState:
+    """Whether a study takes new visits; one that nobody visited is open."""
     return connection.execute(select(STUDIES.c.state).where(STUDIES.c.name == study)).scalar() or "open"
 
 

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from concurrent.futures import Future
 from typing import Any
 
-from galley.records.database.tables import STUDY_STATES, VISIT_STATUSES
+from galley.outcomes import VISIT_STATUSES
+from galley.records.database.tables import STUDY_STATES, StudyState
 from galley.records.rows import Arrival, Begun, VisitRow
 from galley.records.store import absences, arrivals, queries, visit_writes
 from galley.records.store.arrivals import Allocate, Plan
@@ -178,8 +179,8 @@ class VisitStore(StoreBase):
             lambda connection: visit_writes.add_note(connection, visit_id, author, text, round(at_ms))
         )
 
-    def study_state(self, study: str) -> Future[str]:
-        """Whether a study takes new visits: open, paused or closed."""
+    def study_state(self, study: str) -> Future[StudyState]:
+        """Whether a study takes new visits."""
         return self.read(lambda connection: queries.study_state(connection, study))
 
     def set_study_state(self, study: str, state: str, at_ms: float) -> Future[None]:

@@ -18,7 +18,6 @@ from galley.server.headers import same_origin
 from galley.server.participant.step_context import (
     common_context,
     ending_context,
-    public_fallback,
     public_study,
     questionnaire_of,
     step_context,
@@ -28,16 +27,9 @@ from galley.server.participant.visits import GRACE_S, TEST_PARAM, Visit, Visits
 from galley.server.rounds.lobby import Lobby, Meeting
 from galley.server.rounds.matches import Matches, RoundBusy
 from galley.server.rounds.relay import RELAYED, hand_over
+from galley.study.stages.round_step import RoundStep
 from galley.study.study import Study
-from galley.study.visit.plan import Step
-from galley.study.visit.progress import (
-    Agreed,
-    Continued,
-    Declined,
-    Happening,
-    Skipped,
-    Submitted,
-)
+from galley.study.visit.happenings import Skipped
 from galley.study.written.languages import choose_language
 from galley.study.written.questionnaire import validate_answers
 from galley.translations import language_name, mark
@@ -186,11 +178,12 @@ class Pages:
         if visit.progress.status not in ("active", "completed"):
             return self._page("ending.html", **ending_context(visit))
         await self._visits.entered(visit)
-        if not visit.active or visit.step.data.get("partner") != "human":
+        step = visit.round_with_human
+        if step is None:
             return self._step_page(visit)
         meeting = await self._lobby.see(visit)
         if meeting.waiting:
-            return self._lobby_page(visit, meeting)
+            return self._lobby_page(visit, step, meeting)
         if not meeting.begun:
             return RedirectResponse(visit.url, 303, NEVER_CACHED)
         return self._step_page(visit, partner="agent" if meeting.alone else "human")
@@ -201,7 +194,7 @@ class Pages:
         if visit is None:
             return JSONResponse({"waiting": False, "seconds_left": 0}, 404, NEVER_CACHED)
         meeting = Meeting(waiting=False)
-        if visit.active and visit.step.data.get("partner") == "human":
+        if visit.round_with_human is not None:
             meeting = await self._lobby.see(visit)
         answer = {"waiting": meeting.waiting, "seconds_left": meeting.seconds_left}
         return JSONResponse(answer, 200, NEVER_CACHED)
@@ -215,7 +208,7 @@ class Pages:
             form = await read_form(request, self._max_form_bytes)
         except FormError as error:
             return Response(status_code=error.status, headers=NEVER_CACHED)
-        if visit.active and form.get("step") == [visit.step.id] and visit.step.kind != "round":
+        if visit.active and form.get("step") == [visit.step.id] and visit.round is None:
             await self._visits.hidden(visit, hidden=form.get("hidden") == ["1"])
         return Response(status_code=204, headers=NEVER_CACHED)
 
@@ -238,7 +231,7 @@ class Pages:
         overdue = self._visits.overdue(visit, GRACE_S)
         if overdue is not None:
             await time_is_up(self._visits, self._matches, visit, overdue)
-        elif step.kind == "round":
+        elif visit.round is not None:
             await self._round_form(visit, form, relayed=RELAYED in request.headers)
         elif "skip" in form and step.skippable:
             await self._visits.happened(visit, Skipped(step.id))
@@ -248,7 +241,6 @@ class Pages:
 
     async def _answered(self, visit: Visit, form: Mapping[str, list[str]]) -> Response | None:
         """The page again when something is missing or it is too early; None once the form is used."""
-        step = visit.step
         questionnaire = questionnaire_of(visit)
         answers: Mapping[str, Any] | None = None
         problems: Mapping[str, str] = {}
@@ -259,10 +251,10 @@ class Pages:
         if problems and "time_up" in form and soon is not None:
             await time_is_up(self._visits, self._matches, visit, soon)
             return None
-        early = visit.wait_s(self._clock.ms()) > 1.0 and step.kind != "consent"
+        early = visit.wait_s(self._clock.ms()) > 1.0
         if problems or early:
             return self._step_page(visit, 422, form, problems, early=early)
-        happening = _happening(step, form)
+        happening = visit.step.happening(form)
         if happening is not None:
             await self._visits.happened(visit, happening, answers, questionnaire)
         return None
@@ -275,7 +267,7 @@ class Pages:
                 if relayed or not busy.address:
                     raise GalleyError(str(busy)) from None
                 await hand_over(busy.address, visit.url, form)
-        elif "leave" in form and visit.step.data["partner"] == "human":
+        elif "leave" in form and visit.round_with_human is not None:
             await self._lobby.leave(visit)
 
     # ---- rendering -----------------------------------------------------------------------------------------
@@ -305,15 +297,15 @@ class Pages:
         context = common_context(visit, self._clock.ms()) | step_context(visit, values, problems) | more
         return self._page(f"{visit.step.kind}.html", status, **context)
 
-    def _lobby_page(self, visit: Visit, meeting: Meeting) -> Response:
+    def _lobby_page(self, visit: Visit, step: RoundStep, meeting: Meeting) -> Response:
         context = common_context(visit, self._clock.ms()) | {
             "seconds_left": meeting.seconds_left,
             "waited_s": meeting.waited_s,
             "poll": f"{visit.url}/lobby",
-            "human_hat": visit.step.data["human_hat"],
-            "fallback": public_fallback(visit.step),
-            "round_no": visit.step.data["round_no"],
-            "of": visit.step.data["of"],
+            "human_hat": step.human_hat,
+            "fallback": None if step.lobby is None else step.lobby.without_partner,
+            "round_no": step.round_no,
+            "of": step.of,
         }
         return self._page("lobby.html", **context)
 
@@ -341,19 +333,3 @@ def _language(study: Study, request: Request) -> str:
     if asked in study.languages:
         return asked
     return choose_language(study.languages, request.headers.get("accept-language"))
-
-
-def _happening(step: Step, form: Mapping[str, list[str]]) -> Happening | None:
-    """What a form without problems means for the visit; None when it says nothing."""
-    match step.kind:
-        case "consent":
-            choice = form.get("choice", [""])[0]
-            if choice == "decline":
-                return Declined(step.id)
-            return Agreed(step.id) if choice == "agree" else None
-        case "instructions" | "break":
-            return Continued(step.id)
-        case "questionnaire" | "comparison" | "quiz":
-            return Submitted(step.id)
-        case _:
-            return None

@@ -8,17 +8,12 @@ from typing import Any
 
 from galley.server.participant.visits import Visit
 from galley.study.scores import wrong_items
+from galley.study.stages.kinds import DebriefStep, QuizStep
+from galley.study.stages.round_step import RoundStep
 from galley.study.study import Study
-from galley.study.visit.plan import Step
+from galley.study.visit.steps import QuestionsStep, Step, TextStep
 from galley.study.written.item_base import Answer
 from galley.study.written.questionnaire import Questionnaire
-
-QUESTION_PAGES = ("questionnaire", "comparison", "quiz")
-ROUND_WORDS = (
-    *("round_no", "of", "goal", "bonus", "human_hat", "partner_hat", "tutorial", "skippable"),
-    *("partner", "episodes", "show_score", "input_mode"),
-)
-"""What of a round's settings its page may know."""
 
 
 def public_study(study: Study) -> dict[str, Any]:
@@ -28,19 +23,12 @@ def public_study(study: Study) -> dict[str, Any]:
 
 def public_step(step: Step) -> dict[str, Any]:
     """What templates may know of a step: no agents, no seeds."""
-    about = {name: step.data.get(name) for name in ("round_no", "partner_hat", "human_hat")}
-    return {"id": step.id, "kind": step.kind, "title": step.title, **about}
-
-
-def public_fallback(step: Step) -> str:
-    """What follows when nobody comes to play, without the name of the agent that it may be."""
-    fallback: str = step.data["lobby"]["fallback"]
-    return fallback if fallback in ("exit", "go_on") else "agent"
+    return {"id": step.id, "kind": step.kind, "title": step.title, **step.public()}
 
 
 def questionnaire_of(visit: Visit) -> Questionnaire | None:
     """The questions that a visit's page asks, in its order; None for a page that asks nothing."""
-    return visit.study.questionnaire_for(visit.step) if visit.step.kind in QUESTION_PAGES else None
+    return visit.study.questionnaire_for(visit.step) if isinstance(visit.step, QuestionsStep) else None
 
 
 def common_context(visit: Visit, now_ms: float) -> dict[str, Any]:
@@ -56,7 +44,7 @@ def common_context(visit: Visit, now_ms: float) -> dict[str, Any]:
         "language": visit.row.language,
         "test": visit.row.test,
         "seconds_left": None if left_s is None else max(0, math.ceil(left_s)),
-        "away": f"{visit.url}/away" if visit.active and visit.step.kind != "round" else None,
+        "away": f"{visit.url}/away" if visit.active and visit.round is None else None,
         "visit_seconds_left": None if whole_s is None else max(0, math.ceil(whole_s)),
         "wait_s": math.ceil(visit.wait_s(now_ms)),
         "skippable": visit.step.skippable,
@@ -69,31 +57,25 @@ def step_context(
     problems: Mapping[str, str] | None = None,
 ) -> dict[str, Any]:
     """What the page of a visit's step is given besides; `values` and `problems` are of a form sent back."""
-    step, data = visit.step, visit.step.data
-    match step.kind:
-        case "consent" | "instructions" | "break":
-            return {"html": _html(visit, data["text"])}
-        case "debrief":
+    step = visit.step
+    context = step.public()
+    if isinstance(step, TextStep):
+        context["html"] = _html(visit, step.text)
+    if isinstance(step, QuestionsStep):
+        context |= {
+            "questionnaire": questionnaire_of(visit),
+            "values": values or {},
+            "problems": problems or {},
+        }
+    match step:
+        case QuizStep():
+            context |= _quiz(visit, step, sent_back=bool(problems))
+        case DebriefStep():
             end = visit.study.ending("completed", visit.row.link_params)
-            return {
-                "html": _html(visit, data["text"]),
-                "completion_code": end.code,
-                "redirect": end.redirect,
-            }
-        case "questionnaire":
-            return _asked(visit, values, problems)
-        case "comparison":
-            hats = {name: {"hat": data[name]["hat"]} for name in ("first", "second")}
-            return {**_asked(visit, values, problems), **hats, "human_hat": data["human_hat"]}
-        case "quiz":
-            return _quiz(visit, values, problems)
-        case _:
-            return {
-                **{name: data.get(name) for name in ROUND_WORDS},
-                "socket": f"{visit.url}/play",
-                "next": visit.url,
-                "minutes": data["episodes"] * data["ticks"] * data["tick_ms"] / 60_000,
-            }
+            context |= {"completion_code": end.code, "redirect": end.redirect}
+        case RoundStep():
+            context |= {"socket": f"{visit.url}/play", "next": visit.url, "minutes": step.seconds / 60}
+    return context
 
 
 def ending_context(visit: Visit) -> dict[str, Any]:
@@ -119,30 +101,18 @@ def _html(visit: Visit, text: str | None) -> str | None:
     return None if text is None else visit.study.texts[text].html
 
 
-def _asked(
-    visit: Visit, values: Mapping[str, Sequence[str]] | None, problems: Mapping[str, str] | None
-) -> dict[str, Any]:
-    return {"questionnaire": questionnaire_of(visit), "values": values or {}, "problems": problems or {}}
-
-
-def _quiz(
-    visit: Visit, values: Mapping[str, Sequence[str]] | None, problems: Mapping[str, str] | None
-) -> dict[str, Any]:
-    """A quiz; after a failed try it shows what was answered and which of it was wrong."""
-    data = visit.step.data
-    questionnaire = visit.study.questionnaire_for(visit.step)
-    wrong: Mapping[str, str] = {}
-    if visit.attempt is not None and not problems:
-        wrong = wrong_items(questionnaire, visit.attempt.answers)
-        values = as_sent(questionnaire, visit.attempt.answers)
-    return {
-        "questionnaire": questionnaire,
-        "values": values or {},
-        "problems": problems or {},
-        "wrong": wrong,
-        "tries_left": data["tries"] - visit.progress.tries,
-        "html": _html(visit, data["text"]),
+def _quiz(visit: Visit, step: QuizStep, *, sent_back: bool) -> dict[str, Any]:
+    """What a quiz shows besides: after a failed try what was answered and which of it was wrong."""
+    context: dict[str, Any] = {
+        "tries_left": step.tries - visit.progress.tries,
+        "html": _html(visit, step.text),
+        "wrong": {},
     }
+    if visit.attempt is not None and not sent_back:
+        questionnaire = visit.study.questionnaire_for(step)
+        context["wrong"] = wrong_items(questionnaire, visit.attempt.answers)
+        context["values"] = as_sent(questionnaire, visit.attempt.answers)
+    return context
 
 
 def as_sent(questionnaire: Questionnaire, answers: Mapping[str, Answer]) -> dict[str, list[str]]:

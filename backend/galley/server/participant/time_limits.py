@@ -14,7 +14,7 @@ from galley.server.clock import Clock
 from galley.server.participant.visits import GRACE_S, Visit, Visits
 from galley.server.rounds.matches import Matches, RoundBusy
 from galley.study.study import Study
-from galley.study.visit.progress import Ended, Happening
+from galley.study.visit.happenings import Ended, Happening
 
 LOG = logging.getLogger(__name__)
 LOOK_EVERY_S: Final = 2.0
@@ -26,7 +26,7 @@ async def time_is_up(visits: Visits, matches: Matches, visit: Visit, happening: 
     A round that is being played is played to its end first: its partner, who may be a person, has done
     nothing wrong, and what is stored is whole. One that waits or stands still ends as abandoned.
     """
-    if isinstance(happening, Ended) and visit.step.kind == "round":
+    if isinstance(happening, Ended) and visit.round is not None:
         try:
             if matches.in_play(visit):
                 return

@@ -9,22 +9,17 @@ from typing import Any, Final, Literal
 from weakref import WeakValueDictionary
 
 from galley.records import Arrival, Planned, Store, VisitRow
+from galley.records.rows import NoRoom
 from galley.records.store.links_for_tests import LinkForTests, LinksForTests
 from galley.records.store.visit_state import Attempt, visit_state
 from galley.server.clock import Clock
+from galley.study.stages.round_step import RoundStep
 from galley.study.study import Study
 from galley.study.visit.condition_slots import allocate, capacity, cell_number, cells, slot_in_cell
-from galley.study.visit.plan import Plan, Step, plan_visit, visit_seed
-from galley.study.visit.progress import (
-    Agreed,
-    Ended,
-    Happening,
-    Progress,
-    Refusal,
-    TimedOut,
-    next_progress,
-    position,
-)
+from galley.study.visit.happenings import Agreed, Ended, Happening, TimedOut
+from galley.study.visit.plan import Plan, plan_visit, visit_seed
+from galley.study.visit.progress import Progress, Refusal, next_progress, position
+from galley.study.visit.steps import Step, TextStep
 from galley.study.written.questionnaire import Questionnaire
 from galley.study.written.recruitment import INVITATION_PARAM
 from galley.translations import Catalogues, Translator
@@ -35,7 +30,7 @@ GRACE_S: Final = 5.0
 TEST_PARAM: Final = "galley-test"
 """The parameter of a test link; a name that no recruiter's link has."""
 
-NotBegun = Literal["full", "later", "paused", "closed", "uninvited", "untested"]
+NotBegun = NoRoom | Literal["uninvited", "untested"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +53,23 @@ class Visit:
     def step(self) -> Step:
         """The step the participant is at."""
         return self.plan.steps[self.progress.step_index]
+
+    @property
+    def round(self) -> RoundStep | None:
+        """The round the participant is at; None at any other step."""
+        return self.step if isinstance(self.step, RoundStep) else None
+
+    @property
+    def round_with_human(self) -> RoundStep | None:
+        """The round that the participant is to play with another one; None if they are at none."""
+        step = self.round
+        return step if self.active and step is not None and step.partner == "human" else None
+
+    @property
+    def agreed_to(self) -> str | None:
+        """The hash of the text that the page of the step shows."""
+        text = self.step.text if isinstance(self.step, TextStep) else None
+        return None if text is None else self.study.texts[text].sha256
 
     @property
     def url(self) -> str:
@@ -149,7 +161,7 @@ class Visits:
         if study.invitations is not None and who is None:
             return "uninvited"
         state = await asyncio.wrap_future(self._store.study_state(study.name))
-        return state if state != "open" and who is None else None  # type: ignore[return-value]
+        return state if state != "open" and who is None else None
 
     async def begin(self, study: Study, params: Mapping[str, str], language: str) -> Visit | NotBegun:
         """A visit at its first step, or the one that this person has already, or why there is none."""
@@ -188,11 +200,11 @@ class Visits:
                 arrival, plan, lambda slots: allocate(slots, now_ms, expires_ms, capacity(study))
             )
         )
-        if begun.visit is None:
-            return begun.why  # type: ignore[return-value]
-        found = await self.find(begun.visit.token)
+        if begun.why != "new" and begun.why != "again":
+            return begun.why
+        found = None if begun.visit is None else await self.find(begun.visit.token)
         if found is None:
-            raise RuntimeError(f"visit {begun.visit.id} vanished")
+            raise RuntimeError(f"a visit to {study.name} vanished as it began")
         return found
 
     # ---- on the way ----------------------------------------------------------------------------------------
@@ -215,7 +227,7 @@ class Visits:
             row,
             study.in_language(row.language),
             plan,
-            Progress(row.step_index, row.status, row.tries),  # type: ignore[arg-type]
+            Progress(row.step_index, row.status, row.tries),
             found.answers,
             found.entered_ms.get(here),
             attempt,
@@ -283,11 +295,6 @@ class Visits:
                     at_ms,
                     completion_code=code,
                     questionnaire=questionnaire,
-                    consent_sha256=_agreed_to(now) if isinstance(happening, Agreed) else None,
+                    consent_sha256=now.agreed_to if isinstance(happening, Agreed) else None,
                 )
             )
-
-
-def _agreed_to(visit: Visit) -> str:
-    """The hash of the text that a consent page shows."""
-    return visit.study.texts[visit.step.data["text"]].sha256

@@ -8,7 +8,8 @@ from typing import Any
 from fastapi import Request
 from fastapi.responses import JSONResponse, RedirectResponse, Response
 
-from galley.records.database.tables import STUDY_STATES, VISIT_STATUSES
+from galley.outcomes import VISIT_STATUSES
+from galley.records.database.tables import STUDY_STATES
 from galley.records.reading import overview
 from galley.records.rows import SessionRow
 from galley.records.store.links_for_tests import LinksForTests

@@ -13,12 +13,11 @@ from galley.records.store.pairing import Waits
 from galley.server.clock import Clock
 from galley.server.participant.visits import Visit, Visits
 from galley.server.rounds.matches import Matches
-from galley.study.visit.progress import Ended, RoundEnded
+from galley.study.stages.round_step import LobbyRules
+from galley.study.visit.happenings import Ended, RoundEnded
 
 GONE_S: Final = 15.0
 """Who asked last so long ago does not wait any more; pages ask every few seconds."""
-
-EXIT, GO_ON = "exit", "go_on"
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +61,7 @@ class Lobby:
             if found is not None:
                 return await self._begun(visit) or Meeting(waiting=False, begun=True)
             waited_s = visit.spent_s(self._clock.ms())
-            left_s = visit.step.data["lobby"]["wait_s"] - waited_s
+            left_s = _rules(visit).wait_s - waited_s
             if left_s <= 0:
                 return await self._fall_back(visit)
             return Meeting(waiting=True, seconds_left=math.ceil(left_s), waited_s=int(waited_s))
@@ -80,22 +79,33 @@ class Lobby:
 
     async def _fall_back(self, visit: Visit) -> Meeting:
         paired = await asyncio.wrap_future(self._store.stop_waiting(visit.row.id, visit.step.id))
-        fallback = visit.step.data["lobby"]["fallback"]
         if paired is not None:
             return await self._begun(visit) or Meeting(waiting=False, begun=True)
-        if fallback == EXIT:
-            await self._visits.happened(visit, Ended(visit.step.id, "partner_missing"))
-        elif fallback == GO_ON:
-            await self._visits.happened(visit, RoundEnded(visit.step.id, "abandoned"))
-        else:
-            await self._matches.set_up(visit, fallback)
+        rules = _rules(visit)
+        if rules.fallback_agent is not None:
+            await self._matches.set_up(visit, rules.fallback_agent)
             return Meeting(waiting=False, begun=True, alone=True)
+        if rules.without_partner == "exit":
+            await self._visits.happened(visit, Ended(visit.step.id, "partner_missing"))
+        else:
+            await self._visits.happened(visit, RoundEnded(visit.step.id, "abandoned"))
         return Meeting(waiting=False)
 
     def _lock(self, visit: Visit) -> asyncio.Lock:
         return self._locks.setdefault(visit.row.id, asyncio.Lock())
 
 
+def _rules(visit: Visit) -> LobbyRules:
+    """What the visit's plan says of waiting.
+
+    Raises:
+        ValueError: nobody is to be waited for at the visit's step.
+    """
+    if visit.round is None or visit.round.lobby is None:
+        raise ValueError(f"step '{visit.step.id}' has no lobby")
+    return visit.round.lobby
+
+
 def _waits(visit: Visit) -> Waits:
-    step = visit.step
-    return Waits(visit.row.id, step.id, visit.progress.step_index, step.data["pairing"])
+    pairing = "" if visit.round is None else visit.round.pairing
+    return Waits(visit.row.id, visit.step.id, visit.progress.step_index, pairing)

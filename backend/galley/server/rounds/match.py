@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from typing import Any, Protocol
 
 from galley.kitchen import STAY
+from galley.outcomes import RoundOutcome
 from galley.protocol import messages as wire
 from galley.protocol.scene import Scene, happenings
 from galley.records import LeaseLost, PauseRow
@@ -16,7 +17,7 @@ from galley.server.clock import Clock, first_deadline
 from galley.server.rounds.episodes import Course
 from galley.server.rounds.person import Connection, Person
 from galley.server.rounds.round_journal import Handed, Played, RoundJournal
-from galley.server.rounds.round_spec import END_ROUND, RoundSpec, picture
+from galley.server.rounds.round_spec import RoundSpec, picture
 from galley.server.rounds.thinking import Mind, Question
 
 LOG = logging.getLogger(__name__)
@@ -30,10 +31,10 @@ MAX_ABSENCES = 200
 class Keeping(Protocol):
     """What a match asks of whoever made it."""
 
-    async def finish(self, match: Match, outcome: str) -> None:
+    async def finish(self, match: Match, outcome: RoundOutcome) -> None:
         """Store the end; awaited once, before anybody is told."""
 
-    async def stand_in(self, match: Match, person: Person) -> Mind:
+    async def stand_in(self, match: Match, person: Person, agent: str) -> Mind:
         """An agent made ready for the seat of somebody who left, once that is stored."""
 
     def forget(self, match: Match) -> None:
@@ -70,7 +71,7 @@ class Match:
         self.scene = Scene(course.layout)
         self.players = list(players)
         self.phase = "waiting"
-        self.outcome: str | None = None
+        self.outcome: RoundOutcome | None = None
         self.left: tuple[Person, ...] = ()
         self.journal = journal
         self._clock = clock
@@ -346,16 +347,16 @@ class Match:
         there = [one for one in self.people if one not in absent and (one.ready or asked)]
         if not there:
             self.end("abandoned")
-        elif self.spec.dropout == END_ROUND:
+        elif self.spec.stand_in is None:
             self.left = absent
             self.end("abandoned")
         elif self._replacing is None:
-            self._replacing = self._loop.create_task(self._replace(absent[0]))
+            self._replacing = self._loop.create_task(self._replace(absent[0], self.spec.stand_in))
 
-    async def _replace(self, person: Person) -> None:
+    async def _replace(self, person: Person, agent: str) -> None:
         """An agent takes the seat of a person, who leaves the round."""
         try:
-            mind = await self._keeping.stand_in(self, person)
+            mind = await self._keeping.stand_in(self, person, agent)
         except Exception:  # whatever keeps the agent from coming, the other person must not wait for ever
             LOG.exception("round %d goes on with nobody", self.spec.round_id)
             self.left = (person,)
@@ -380,7 +381,7 @@ class Match:
 
     # ---- the end -------------------------------------------------------------------------------------------
 
-    def end(self, outcome: str) -> None:
+    def end(self, outcome: RoundOutcome) -> None:
         """End the round, if it has not ended yet; `ended` tells when that is stored."""
         if self.phase == "ended":
             return
@@ -397,7 +398,7 @@ class Match:
         if self._ending is not None:
             await asyncio.wait([self._ending])
 
-    async def _close(self, outcome: str) -> None:
+    async def _close(self, outcome: RoundOutcome) -> None:
         # A little later, so that the last tick has reached the socket and its lateness is known.
         await asyncio.sleep(0.01)
         self.journal.write()

@@ -13,6 +13,7 @@ from weakref import WeakValueDictionary
 
 from galley.agents.catalogue import Catalogue
 from galley.kitchen import Layout
+from galley.outcomes import RoundOutcome
 from galley.protocol import messages as wire
 from galley.records import Lease, NewRound, RoundRow, Store, VisitRow
 from galley.records.database import leases
@@ -24,11 +25,12 @@ from galley.server.rounds.episodes import Course
 from galley.server.rounds.match import Match
 from galley.server.rounds.person import Person
 from galley.server.rounds.round_journal import RoundJournal
-from galley.server.rounds.round_spec import END_ROUND, RoundSpec
+from galley.server.rounds.round_spec import RoundSpec
 from galley.server.rounds.set_up import of_one, of_two
 from galley.server.rounds.takeover import caught_up, ready_agent
 from galley.server.rounds.thinking import Mind, Thinking
-from galley.study.visit.progress import RoundEnded
+from galley.study.stages.round_step import RoundStep
+from galley.study.visit.happenings import RoundEnded
 
 LOG = logging.getLogger(__name__)
 LEASE_S = 10.0
@@ -111,16 +113,16 @@ class Matches:
 
         Raises: RoundBusy when another process has the round and keeps it.
         """
-        step = visit.step
-        if not visit.active or step.kind != "round":
+        step = visit.round
+        if not visit.active or step is None:
             return None
         there = self._place(visit)
         if there is not None:
             return there
         async with self._lock("visit", visit.row.id):
             row = await self._row(visit)
-            if row is None and step.data["partner"] != "human":
-                await self.set_up(visit, step.data["agent"])
+            if row is None and step.agent is not None:
+                await self.set_up(visit, step.agent)
                 row = await self._row(visit)
         if row is None:
             return None
@@ -151,10 +153,10 @@ class Matches:
 
     async def skip(self, visit: Visit) -> bool:
         """Whether the round a visit is at was skipped; only some may be."""
-        step = visit.step
-        if step.kind != "round" or not step.skippable:
+        step = visit.round
+        if step is None or not step.skippable:
             return False
-        if not await self.begun(visit) and step.data["partner"] == "human":
+        if not await self.begun(visit) and step.partner == "human":
             return await self._visits.happened(visit, RoundEnded(step.id, "skipped"))
         place = await self.of(visit)
         if place is None:
@@ -169,14 +171,14 @@ class Matches:
             if place is not None:
                 await self._leave(visit, place, "abandoned")
 
-    async def _leave(self, visit: Visit, place: Place, outcome: str) -> None:
+    async def _leave(self, visit: Visit, place: Place, outcome: RoundOutcome) -> None:
         """End the round for one person, who alone decides about it when they play with an agent."""
         if len(place.match.people) == 1:
             place.match.end(outcome)
             await place.match.ended()
             return
         place.match.drop_out(place.person)
-        await self._visits.happened(visit, RoundEnded(visit.step.id, outcome))  # type: ignore[arg-type]
+        await self._visits.happened(visit, RoundEnded(visit.step.id, outcome))
 
     async def stop(self) -> None:
         """Stop every match for a shutdown: all that was played is journalled, rounds that are over closed.
@@ -211,7 +213,7 @@ class Matches:
     async def set_up(self, visit: Visit, agent: str) -> int:
         """The id of the round of a visit's step, set up with an agent."""
         bundle = self._catalogue.bundle(agent)
-        sits = visit.row.id, visit.step
+        sits = visit.row.id, round_at(visit)
         new = of_one(self._layouts, *sits, bundle.name, bundle.sha256, self._clock.ms())
         return await asyncio.wrap_future(self._store.set_up_round(new))
 
@@ -240,7 +242,7 @@ class Matches:
                 if lease is not None:
                     await asyncio.wrap_future(self._store.release(lease))
                 # The server stopped between closing the round and moving on, or the seat was given away.
-                await self._visits.happened(visit, RoundEnded(visit.step.id, outcome or "abandoned"))  # type: ignore[arg-type]
+                await self._visits.happened(visit, RoundEnded(visit.step.id, outcome or "abandoned"))
                 return None
             live = self._live[round_id] = _Live(await self._make(visit, row, lease), row)
             if _erased(row):
@@ -251,7 +253,7 @@ class Matches:
         """The right to write the round; None where no other process could have it."""
         if self._only_server:
             return None
-        steal = visit.step.data["partner"] != "human"
+        steal = round_at(visit).partner != "human"
         lease = await asyncio.wrap_future(
             self._store.lease_round(round_id, self._owner, LEASE_S, steal=steal, address=self._address)
         )
@@ -265,8 +267,8 @@ class Matches:
         person = next((one for one in live.match.people if one.seat == seat), None)
         if person is None:
             return None
-        data = visit.step.data
-        own, other = data["human_hat"], data["partner_hat"]
+        step = round_at(visit)
+        own, other = step.human_hat, step.partner_hat
         person.hats = (own, other) if seat == 0 else (other, own)
         person.next_url = visit.url
         live.visits[person.seat] = visit
@@ -284,24 +286,24 @@ class Matches:
         return self._seat(visit, live)
 
     async def _make(self, visit: Visit, row: RoundRow, lease: Lease | None) -> Match:
-        data, config = visit.step.data, visit.study.config
+        step, config = round_at(visit), visit.study.config
         drawn = Layout.from_dict(json.loads(row.layout_json))
         layout = self._known.setdefault(drawn, drawn)
-        seeds = tuple(data["seeds"]) if data["seed"] == row.seed else (row.seed,) * row.episodes
+        seeds = step.seeds if step.seeds and step.seed == row.seed else (row.seed,) * row.episodes
         spec = RoundSpec(
             round_id=row.id,
             tick_ms=row.tick_ms,
-            goal=None if data["goal"] is None else data["goal"]["score"],
+            goal=None if step.goal is None else step.goal.score,
             round_no=row.round_no,
-            of=data["of"],
-            tutorial=data["tutorial"],
+            of=step.of,
+            tutorial=step.tutorial,
             countdown_s=config.countdown_s,
             abandon_after_s=config.abandon_after_s,
             seeds=seeds,
-            partner="agent" if _with_agent(row) and data["partner"] == "human" else data["partner"],
-            input_mode=data["input_mode"],
-            show_score=data["show_score"],
-            dropout=data.get("lobby", {}).get("dropout", END_ROUND),
+            partner="agent" if _with_agent(row) and step.partner == "human" else step.partner,
+            input_mode=step.input_mode,
+            show_score=step.show_score,
+            stand_in=None if step.lobby is None else step.lobby.dropout_agent,
         )
         course = await self._think(lambda: caught_up(layout, row.episodes, row.joint_actions))
         players: list[Person | Mind] = []
@@ -337,7 +339,7 @@ class Matches:
 
     # ---- what a match asks for -----------------------------------------------------------------------------
 
-    async def finish(self, match: Match, outcome: str) -> None:
+    async def finish(self, match: Match, outcome: RoundOutcome) -> None:
         """Store the end of a round and move its people on."""
         course = match.course
         live = self._live.get(match.spec.round_id)
@@ -356,14 +358,14 @@ class Matches:
             for person in match.people:
                 visit = None if live is None else live.visits.get(person.seat)
                 if visit is not None:
-                    await self._visits.happened(visit, RoundEnded(visit.step.id, outcome))  # type: ignore[arg-type]
+                    await self._visits.happened(visit, RoundEnded(visit.step.id, outcome))
         finally:
             self.forget(match)
 
-    async def stand_in(self, match: Match, person: Person) -> Mind:
+    async def stand_in(self, match: Match, person: Person, agent: str) -> Mind:
         """An agent for the seat of somebody who left, whose visit goes on without the round."""
         live = self._live[match.spec.round_id]
-        bundle = self._catalogue.bundle(match.spec.dropout)
+        bundle = self._catalogue.bundle(agent)
         now_ms = self._clock.ms()
         await asyncio.wrap_future(
             self._store.stand_in(
@@ -411,11 +413,22 @@ class Matches:
         return self._locks.setdefault((what, number), asyncio.Lock())
 
 
+def round_at(visit: Visit) -> RoundStep:
+    """The round that a visit is at.
+
+    Raises:
+        ValueError: it is at another step.
+    """
+    if visit.round is None:
+        raise ValueError(f"step '{visit.step.id}' is no round")
+    return visit.round
+
+
 def _with_agent(row: RoundRow) -> bool:
     return any(seat.agent is not None for seat in row.seats)
 
 
-def _over(row: RoundRow, visit: Visit) -> str | None:
+def _over(row: RoundRow, visit: Visit) -> RoundOutcome | None:
     """How the round ended for a visit; None while it may be played."""
     if row.status != "open":
         return row.status

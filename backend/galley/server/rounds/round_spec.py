@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 from galley.protocol.scene import Scene
 from galley.server.rounds.episodes import Course
 from galley.server.rounds.person import Person
-
-END_ROUND: Final = "end_round"
-"""What may follow a drop-out: the round ends. Anything else is the agent that takes the seat."""
+from galley.study.stages.round_step import InputMode, Partner, ShowScore
 
 
 @dataclass(frozen=True, slots=True)
 class RoundSpec:
     """What is fixed about a round before it is played, besides its kitchen and who plays.
 
-    `seeds` are those of the agent's episodes; `dropout` is what follows when one of two people does not come
-    back: END_ROUND, or the name of the agent that takes the seat.
+    `seeds` are those of the agent's episodes; `stand_in` is the agent that takes the seat when one of two
+    people does not come back, None if the round ends then.
     """
 
     round_id: int
@@ -30,10 +28,10 @@ class RoundSpec:
     countdown_s: int
     abandon_after_s: float
     seeds: tuple[int, ...] = (0,)
-    partner: str = "agent"
-    input_mode: str = "hold"
-    show_score: str = "during"
-    dropout: str = END_ROUND
+    partner: Partner = "agent"
+    input_mode: InputMode = "hold"
+    show_score: ShowScore = "during"
+    stand_in: str | None = None
 
 
 def picture(spec: RoundSpec, scene: Scene, course: Course, phase: str, person: Person) -> dict[str, Any]:

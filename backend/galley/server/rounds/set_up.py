@@ -4,52 +4,53 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import Any
 
 from galley.kitchen import Layout
 from galley.records import NewRound, SeatRow, VisitRow
-from galley.study.visit.plan import Plan, Step
+from galley.study.stages.round_step import RoundStep
+from galley.study.visit.plan import Plan
 
 
-def round_layout(layouts: Mapping[str, Layout], data: Mapping[str, Any]) -> Layout:
-    """The layout of a round step, with the round's length as its horizon."""
-    return layouts[data["layout"]].with_rules(horizon_ticks=data["ticks"])
+def round_layout(layouts: Mapping[str, Layout], step: RoundStep) -> Layout:
+    """The layout of a round, with the round's length as its horizon."""
+    return layouts[step.layout].with_rules(horizon_ticks=step.ticks)
 
 
 def of_one(
-    layouts: Mapping[str, Layout], visit_id: int, step: Step, agent: str, sha256: str, at_ms: float
+    layouts: Mapping[str, Layout], visit_id: int, step: RoundStep, agent: str, sha256: str, at_ms: float
 ) -> NewRound:
     """The round of a visit's step, played with an agent."""
-    seat = int(step.data["human_seat"])
-    hat = None if step.data["partner"] == "none" else step.data["partner_hat"]
-    partner = SeatRow(1 - seat, None, None, agent, sha256, hat)
+    hat = None if step.partner == "none" else step.partner_hat
+    partner = SeatRow(1 - step.human_seat, None, None, agent, sha256, hat)
     return _round(layouts, step, visit_id, partner, at_ms)
 
 
 def of_two(layouts: Mapping[str, Layout], first: VisitRow, second: VisitRow, at_ms: float) -> NewRound:
-    """The round that two visits play at their steps; who is named first gets the seat of their plan."""
+    """The round that two visits play at their steps; who is named first gets the seat of their plan.
+
+    Raises:
+        ValueError: one of them is at no round.
+    """
     step, other = (Plan.from_json(row.plan_json).steps[row.step_index] for row in (first, second))
-    seat = 1 - int(step.data["human_seat"])
-    return _round(
-        layouts, step, first.id, SeatRow(seat, second.id, other.id, hat=other.data["human_hat"]), at_ms
-    )
+    if not isinstance(step, RoundStep) or not isinstance(other, RoundStep):
+        raise ValueError(f"visits {first.id} and {second.id} are not both at a round")
+    sits = SeatRow(1 - step.human_seat, second.id, other.id, hat=other.human_hat)
+    return _round(layouts, step, first.id, sits, at_ms)
 
 
 def _round(
-    layouts: Mapping[str, Layout], step: Step, visit_id: int, other: SeatRow, at_ms: float
+    layouts: Mapping[str, Layout], step: RoundStep, visit_id: int, other: SeatRow, at_ms: float
 ) -> NewRound:
-    data = step.data
-    layout = round_layout(layouts, data)
-    seat = int(data["human_seat"])
-    own = SeatRow(seat, visit_id, step.id, hat=data["human_hat"])
+    layout = round_layout(layouts, step)
+    own = SeatRow(step.human_seat, visit_id, step.id, hat=step.human_hat)
     return NewRound(
-        data["round_no"],
+        step.round_no,
         layout.name,
         json.dumps(layout.to_dict()),
         layout.rules.horizon_ticks,
-        data["tick_ms"],
-        data["seed"],
+        step.tick_ms,
+        step.seed,
         at_ms,
-        (own, other) if seat == 0 else (other, own),
-        data["episodes"],
+        (own, other) if step.human_seat == 0 else (other, own),
+        step.episodes,
     )

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final, Literal, get_args
 
-from galley.study.visit.steps import Plan, Step, StepKind
+from galley.outcomes import ENDED_FROM_OUTSIDE, ROUND_OUTCOMES, VisitStatus
+from galley.study.stages.kinds import QuizStep
+from galley.study.visit.happenings import (
+    Declined,
+    Ended,
+    Happening,
+    RoundEnded,
+    Skipped,
+    Submitted,
+    TimedOut,
+)
+from galley.study.visit.plan import Plan
+from galley.study.visit.steps import QuestionsStep, Step
 from galley.study.written.item_base import Answer, is_right
-from galley.study.written.recruitment import Outcome as VisitOutcome
-
-Status = Literal["active"] | VisitOutcome
-Outcome = Literal["finished", "abandoned", "skipped"]
-OUTCOMES: Final[tuple[Outcome, ...]] = get_args(Outcome)
-"""How a round may end; how a visit may end stands in `recruitment`."""
-
-ENDED_FROM_OUTSIDE: Final[tuple[VisitOutcome, ...]] = ("timed_out", "expired", "partner_missing")
 
 Answers = Mapping[str, Mapping[str, Answer]]
 """All answers of a visit so far: by step, then by item."""
@@ -26,81 +29,8 @@ class Progress:
     """Where a visit is: the index of its step, whether it goes on, failed tries at the step's quiz."""
 
     step_index: int = 0
-    status: Status = "active"
+    status: VisitStatus = "active"
     tries: int = 0
-
-
-@dataclass(frozen=True)
-class Agreed:
-    """The participant agreed to the consent text."""
-
-    step_id: str
-
-
-@dataclass(frozen=True)
-class Declined:
-    """The participant declined; the visit ends."""
-
-    step_id: str
-
-
-@dataclass(frozen=True)
-class Submitted:
-    """Answers without a problem arrived (`validate_answers` comes before)."""
-
-    step_id: str
-
-
-@dataclass(frozen=True)
-class Continued:
-    """The participant has read a text or rested and goes on."""
-
-    step_id: str
-
-
-@dataclass(frozen=True)
-class Skipped:
-    """The participant leaves out a step that may be left out."""
-
-    step_id: str
-
-
-@dataclass(frozen=True)
-class TimedOut:
-    """The step's time limit has passed."""
-
-    step_id: str
-
-
-@dataclass(frozen=True)
-class RoundEnded:
-    """A round is over: played to its end, left for too long, or (where allowed) skipped."""
-
-    step_id: str
-    outcome: Outcome
-
-
-@dataclass(frozen=True)
-class Ended:
-    """The visit ends for a reason outside its steps: too long in all, slot given away, partner missing."""
-
-    step_id: str
-    outcome: VisitOutcome
-
-
-Happening = Agreed | Declined | Submitted | Continued | Skipped | TimedOut | RoundEnded | Ended
-
-_FITS: Final[dict[StepKind, tuple[type[Happening], ...]]] = {
-    "consent": (Agreed, Declined),
-    "questionnaire": (Submitted,),
-    "instructions": (Continued,),
-    "quiz": (Submitted,),
-    "break": (Continued,),
-    "screen_out": (),
-    "round": (RoundEnded,),
-    "comparison": (Submitted,),
-    "debrief": (),
-}
 
 
 @dataclass(frozen=True)
@@ -136,14 +66,14 @@ def next_progress(
     if isinstance(happening, TimedOut) and step.at_limit == "end":
         return Progress(progress.step_index, "timed_out")
     if isinstance(happening, Submitted):
-        if step.kind == "quiz" and _wrong(step, answers):
+        if isinstance(step, QuizStep) and _wrong(step, answers):
             tries = progress.tries + 1
-            if tries < step.data["tries"]:
+            if tries < step.tries:
                 return Progress(progress.step_index, "active", tries)
-            if step.data["after_last"] == "end":
+            if step.after_last == "end":
                 return Progress(progress.step_index, "failed_checks", tries)
         failed = failed_attention(plan, answers)
-        if plan.attention["then"] == "end" and len(failed) > plan.attention["allowed"]:
+        if plan.attention.then == "end" and len(failed) > plan.attention.allowed:
             return Progress(progress.step_index, "failed_checks")
     return _onward(plan, progress.step_index + 1, answers)
 
@@ -153,7 +83,7 @@ def failed_attention(plan: Plan, answers: Answers) -> tuple[tuple[str, str], ...
     return tuple(
         (step.id, item)
         for step in plan.steps
-        if step.kind != "quiz" and step.id in answers
+        if isinstance(step, QuestionsStep) and not isinstance(step, QuizStep) and step.id in answers
         for item in _wrong(step, answers)
     )
 
@@ -168,7 +98,9 @@ def position(plan: Plan, progress: Progress, answers: Answers | None = None) -> 
     for index, step in enumerate(plan.steps):
         asked = {str(condition.item).partition(".")[0] for condition in step.when}
         decided = index < progress.step_index or asked <= answers.keys()
-        passed_over = step.kind == "screen_out" or (bool(step.when) and decided and not _met(step, answers))
+        passed_over = step.ends_visit_as == "screened_out" or (
+            bool(step.when) and decided and not _met(step, answers)
+        )
         if index == progress.step_index or not passed_over:
             of += 1
             at += index <= progress.step_index
@@ -178,13 +110,7 @@ def position(plan: Plan, progress: Progress, answers: Answers | None = None) -> 
 def _onward(plan: Plan, index: int, answers: Answers) -> Progress:
     while not _met(plan.steps[index], answers):
         index += 1
-    match plan.steps[index].kind:
-        case "debrief":
-            return Progress(index, "completed")
-        case "screen_out":
-            return Progress(index, "screened_out")
-        case _:
-            return Progress(index)
+    return Progress(index, plan.steps[index].ends_visit_as or "active")
 
 
 def _met(step: Step, answers: Answers) -> bool:
@@ -195,13 +121,12 @@ def _met(step: Step, answers: Answers) -> bool:
     return True
 
 
-def _wrong(step: Step, answers: Answers) -> tuple[str, ...]:
+def _wrong(step: QuestionsStep, answers: Answers) -> tuple[str, ...]:
     """The items with a right answer that were answered otherwise; those not asked have no answer at all."""
     given = answers.get(step.id, {})
-    expected = step.data.get("expected", {})
     return tuple(
         item
-        for item, right in expected.items()
+        for item, right in step.expected.items()
         if given.get(item) is not None and not is_right(right, given[item])
     )
 
@@ -212,16 +137,16 @@ def _refused(step: Step, happening: Happening) -> str | None:
             if happening.outcome not in ENDED_FROM_OUTSIDE:
                 return f"a visit does not end as '{happening.outcome}' by itself"
         case Skipped():
-            if not step.skippable or step.kind in ("consent", "round", "debrief"):
+            if not step.skippable or RoundEnded in step.ended_by:  # a round ends as skipped
                 return "this step may not be skipped"
         case TimedOut():
             if step.time_limit_s is None:
                 return "this step has no time limit"
         case _:
-            if not isinstance(happening, _FITS[step.kind]):
+            if not isinstance(happening, step.ended_by):
                 return f"a {step.kind} step does not end by '{type(happening).__name__}'"
             if isinstance(happening, RoundEnded):
-                if happening.outcome not in OUTCOMES:
+                if happening.outcome not in ROUND_OUTCOMES:
                     return f"a round does not end as '{happening.outcome}'"
                 if happening.outcome == "skipped" and not step.skippable:
                     return "this round may not be skipped"

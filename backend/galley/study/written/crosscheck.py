@@ -10,20 +10,11 @@ from galley.files.reading import Loaded, Loc
 from galley.kitchen import Layout
 from galley.kitchen.reach import reachable_floor
 from galley.names import name_fix
+from galley.study.stages.round_step import ALONE
+from galley.study.stages.rounds import Tutorial
+from galley.study.stages.stage import stage_ids
 from galley.study.written.factors import Condition, levels_of
 from galley.study.written.questionnaire import Questionnaire
-from galley.study.written.stages import (
-    ALONE,
-    HUMAN,
-    Comparison,
-    Lobby,
-    Questions,
-    Quiz,
-    Rounds,
-    Tutorial,
-    conditions_of,
-    stage_ids,
-)
 from galley.study.written.study_file import StudyFile
 from galley.workspace import Workspace
 
@@ -57,19 +48,10 @@ def agent_problems(
 def _meetings(config: StudyFile) -> Iterator[tuple[str, str, Loc]]:
     """(agent, layout, place of the agent in the file) of every round that some visit may play."""
     for place, stage in enumerate(config.stages):
-        named: list[tuple[str, Loc]] = []
-        kitchens: list[str] = []
-        if isinstance(stage, Tutorial) and stage.agent != ALONE:
-            named, kitchens = [(stage.agent, ("stages", place, "agent"))], [stage.layout]
-        elif isinstance(stage, Rounds):
-            named = [(a, ("stages", place, "agents", n)) for n, a in enumerate(stage.agents) if a != HUMAN]
-            named += [(a, ("stages", place, "lobby", key)) for key, a in (stage.lobby or Lobby()).agents]
-            kitchens = [kitchen.layout for kitchen in stage.layouts]
-        for written, loc in named:
+        for written, kitchen, loc in stage.meetings():
             for agent in levels_of(written, config.factors):
-                for kitchen in kitchens:
-                    for layout in levels_of(kitchen, config.factors):
-                        yield agent, layout, loc
+                for layout in levels_of(kitchen, config.factors):
+                    yield agent, layout, ("stages", place, *loc)
 
 
 def kitchen_problems(loaded: Loaded[StudyFile], layouts: Mapping[str, Layout]) -> Iterator[Problem]:
@@ -94,7 +76,7 @@ def questionnaire_problems(
     config = loaded.value
     before: dict[str, tuple[str, ...]] = {}
     for place, (stage_id, stage) in enumerate(zip(stage_ids(config.stages), config.stages, strict=True)):
-        for n, condition in enumerate(conditions_of(stage)):
+        for n, condition in enumerate(stage.conditions):
             if condition.item is not None:
                 known = {
                     name: [questionnaires[q] for q in asked if q in questionnaires]
@@ -102,34 +84,18 @@ def questionnaire_problems(
                 }
                 for key, message, fix in _condition_faults(condition, known):
                     yield loaded.problem(("stages", place, "when", *_at(loaded, place, n), key), message, fix)
-        key = "after_each" if isinstance(stage, Rounds) else "questionnaire"
-        written: str | None = getattr(stage, key, None)
-        if written is None:
-            continue
-        for name in levels_of(written, config.factors):
-            if name in questionnaires:
-                loc = ("stages", place, key)
-                for message, fix in _use_faults(name, questionnaires[name], stage):
-                    yield loaded.problem(loc, message, fix)
-        if isinstance(stage, (Questions, Quiz, Comparison)):
-            before[stage_id] = levels_of(written, config.factors)
+        for kind, written, loc in stage.names():
+            for name in levels_of(written, config.factors) if kind == "questionnaires" else ():
+                if name in questionnaires:
+                    for message, fix in stage.questionnaire_faults(name, questionnaires[name]):
+                        yield loaded.problem(("stages", place, *loc), message, fix)
+        if stage.asks is not None:
+            before[stage_id] = levels_of(stage.asks, config.factors)
 
 
 def _at(loaded: Loaded[StudyFile], place: int, n: int) -> tuple[int, ...]:
     """The place of a condition in the file, where one alone need not stand in a list."""
     return (n,) if ("stages", place, "when", n) in loaded.lines else ()
-
-
-def _use_faults(name: str, questionnaire: Questionnaire, stage: object) -> Iterator[tuple[str, str]]:
-    compares = any(item.compares for item in questionnaire.items)
-    if compares and not isinstance(stage, Comparison):
-        kind = getattr(stage, "kind", "")
-        told = f"questionnaire '{name}' compares two partners, but a {kind} stage shows none"
-        yield told, "use it in a comparison stage"
-    if isinstance(stage, Comparison) and not compares:
-        yield f"questionnaire '{name}' has no comparison item", "use one whose items are of kind comparison"
-    if isinstance(stage, Quiz) and not questionnaire.expected:
-        yield f"no item of questionnaire '{name}' has a right answer", "add `expected: ...` to its items"
 
 
 def _condition_faults(

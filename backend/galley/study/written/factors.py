@@ -66,10 +66,15 @@ class Factor(FileModel):
     @field_validator("levels")
     @classmethod
     def _levels_differ(cls, levels: tuple[str, ...]) -> tuple[str, ...]:
-        twice = [place for place, level in enumerate(levels) if level in levels[:place]]
-        if twice:
-            raise faults([((p,), f"level '{levels[p]}' stands twice", "name each once") for p in twice])
-        return levels
+        return names_differ(levels, "level")
+
+
+def names_differ(names: tuple[Any, ...], what: str) -> tuple[Any, ...]:
+    """The names, each of which has to stand once."""
+    twice = [place for place, name in enumerate(names) if name in names[:place]]
+    if twice:
+        raise faults([((p,), f"{what} '{names[p]}' stands twice", "name each once") for p in twice])
+    return names
 
 
 def resolve(name: str, condition: Mapping[str, Any]) -> str:

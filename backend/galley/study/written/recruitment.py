@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Final, Literal, Self, get_args
+from typing import Annotated, Final, Literal, Self
 from urllib.parse import quote
 
 from pydantic import Field, model_validator
@@ -14,19 +14,8 @@ from pydantic import Field, model_validator
 from galley.errors import InvalidFiles, Problem
 from galley.files.reading import FileModel, faults
 from galley.names import name_fix
+from galley.outcomes import VisitOutcome
 from galley.study.written.factors import TextName, known_name
-
-Outcome = Literal[
-    "completed",
-    "declined",
-    "screened_out",
-    "failed_checks",
-    "timed_out",
-    "expired",
-    "partner_missing",
-]
-VISIT_OUTCOMES: Final[tuple[Outcome, ...]] = get_args(Outcome)
-"""How a visit may end."""
 
 PLATFORM_PARAMS: Final = (
     *("PROLIFIC_PID", "STUDY_ID", "SESSION_ID"),
@@ -117,7 +106,7 @@ class Recruitment(FileModel):
 class Ending:
     """What a visit that ended shows: `text` is a page of the study, or None for a plain one."""
 
-    outcome: Outcome
+    outcome: VisitOutcome
     text: str | None
     code: str | None
     redirect: str | None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import product
 from math import prod
 from typing import Annotated, Any, Final, Literal, Self, get_args
@@ -11,39 +11,31 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from galley.files.reading import FileModel, Loc, faults
 from galley.names import name_fix
+from galley.study.stages.kinds import AnyStage, Comparison, Consent, Debrief
+from galley.study.stages.round_step import InputMode
+from galley.study.stages.rounds import Rounds, TickMs, Ticks, Tutorial
+from galley.study.stages.stage import NamedKind, Stage, stage_ids
 from galley.study.visit.counterbalance import MOST_SEQUENCES, permutations_count, sequences
-from galley.study.written.factors import FACTOR_MARK, Counted, Factor, FactorName, Order, levels_of, resolve
+from galley.study.written.factors import (
+    FACTOR_MARK,
+    Counted,
+    Factor,
+    FactorName,
+    Order,
+    levels_of,
+    names_differ,
+    resolve,
+)
 from galley.study.written.languages import LanguageCode, Text, Words
 from galley.study.written.recruitment import Attention, Completion, Endings, Recruitment, unknown_places
-from galley.study.written.stages import (
-    ALONE,
-    Comparison,
-    Consent,
-    Debrief,
-    InputMode,
-    Lobby,
-    Questions,
-    Quiz,
-    Rounds,
-    Stage,
-    TickMs,
-    Ticks,
-    Tutorial,
-    conditions_of,
-    names_differ,
-    stage_ids,
-)
 
 Hat = Literal["orange", "sky-blue", "bluish-green", "yellow", "blue", "vermillion", "reddish-purple"]
 HATS: Final[tuple[Hat, ...]] = get_args(Hat)
 """Colours that colour-blind people can tell apart. Source: Okabe and Ito, Color Universal Design (2008)."""
 
 MOST_CELLS: Final = 1000
-ALONE_AGENT: Final = "stay"
-"""The agent in the other seat of a tutorial alone; it is not drawn."""
-
 Fault = tuple[Loc, str, str]
-Named = tuple[str, str, Loc]
+Named = tuple[NamedKind, str, Loc]
 """(kind of thing in the workspace, name, place in the file)."""
 
 
@@ -96,7 +88,7 @@ class StudyFile(FileModel):
     """What those who reach the end take away."""
     endings: Endings = Endings()
     """What those take away who do not."""
-    stages: tuple[Stage, ...] = Field(min_length=2)
+    stages: tuple[AnyStage, ...] = Field(min_length=2)
     """The stages in order; consent first, debrief last."""
 
     @field_validator("hats")
@@ -124,7 +116,7 @@ class StudyFile(FileModel):
 
     @field_validator("stages")
     @classmethod
-    def _stages_fit_together(cls, stages: tuple[Stage, ...]) -> tuple[Stage, ...]:
+    def _stages_fit_together(cls, stages: tuple[AnyStage, ...]) -> tuple[AnyStage, ...]:
         found = [*_order_faults(stages), *_id_faults(stages), *_comparison_faults(stages)]
         if found:
             raise faults(found)
@@ -151,8 +143,7 @@ class StudyFile(FileModel):
         """
         found: dict[tuple[int, Counted], int] = {}
         for place, stage in enumerate(self.stages):
-            if isinstance(stage, Rounds):
-                found |= {(place, key): count for key, count in stage.needed().items()}
+            found |= {(place, key): count for key, count in stage.needed().items()}
         worn = self.hats_worn(condition)
         hats = {"latin_square": sequences("latin_square", len(self.hats), 1)}
         hats["full"] = permutations_count(len(self.hats), worn)
@@ -167,7 +158,11 @@ class StudyFile(FileModel):
 
     def hats_worn(self, condition: Mapping[str, str]) -> int:
         """Hats for a participant, their partners and the tutorial's partner, as far as there are so many."""
-        return min(len(self.hats), len(played_agents(self.stages, condition)) + 2)
+        return min(len(self.hats), len(self.partners(condition)) + 2)
+
+    def partners(self, condition: Mapping[str, str]) -> tuple[str, ...]:
+        """The partners of all rounds in a condition, each once, in the order they are first named."""
+        return tuple(dict.fromkeys(resolve(agent, condition) for agent in partners_as_written(self.stages)))
 
     def _together_faults(self) -> Iterator[Fault]:
         if not self.together:
@@ -200,7 +195,7 @@ class StudyFile(FileModel):
                     told = f"level '{level}' stands for one of {kind}, and none has that name"
                     yield ("factors", factor, "levels", n), told, name_fix(level, known[kind])
         for place, stage in enumerate(self.stages):
-            for n, condition in enumerate(conditions_of(stage)):
+            for n, condition in enumerate(stage.conditions):
                 if condition.factor is None:
                     continue
                 loc = ("stages", place, "when", n)
@@ -238,43 +233,17 @@ class StudyFile(FileModel):
 
     def _hat_faults(self) -> Iterator[Fault]:
         tutorials = any(isinstance(stage, Tutorial) for stage in self.stages)
-        wanted = 1 + max(len(played_agents(self.stages, c)) for c in self.conditions()) + tutorials
+        wanted = 1 + max(len(self.partners(c)) for c in self.conditions()) + tutorials
         if len(self.hats) < wanted:
             told = f"{len(self.hats)} hats for a participant, their partners and the tutorial's partner"
             yield ("hats",), told, f"name {wanted} or more of {' '.join(HATS)}"
 
 
-def played_agents(stages: tuple[Stage, ...], condition: Mapping[str, str]) -> tuple[str, ...]:
-    """The partners of all rounds stages in a condition, each once, in the order they are first named."""
-    named = (agent for stage in stages if isinstance(stage, Rounds) for agent in stage.agents)
-    return tuple(dict.fromkeys(resolve(agent, condition) for agent in named))
-
-
-def named_in(stages: tuple[Stage, ...]) -> Iterator[Named]:
+def named_in(stages: Iterable[Stage]) -> Iterator[Named]:
     """Everything that the stages name, in order; a name may be a `$factor`."""
     for place, stage in enumerate(stages):
-        loc = ("stages", place)
-        text: str | None = getattr(stage, "text", None)
-        if text is not None:
-            yield "texts", text, (*loc, "text")
-        match stage:
-            case Questions() | Quiz() | Comparison():
-                yield "questionnaires", stage.questionnaire, (*loc, "questionnaire")
-            case Tutorial():
-                yield "layouts", stage.layout, (*loc, "layout")
-                agent = ALONE_AGENT if stage.agent == ALONE else stage.agent
-                yield "agents", agent, (*loc, "agent")
-            case Rounds():
-                for n, kitchen in enumerate(stage.layouts):
-                    yield "layouts", kitchen.layout, (*loc, "layouts", n, "layout")
-                for n, agent in enumerate(stage.agents):
-                    yield "agents", agent, (*loc, "agents", n)
-                for key, agent in (stage.lobby or Lobby()).agents:
-                    yield "agents", agent, (*loc, "lobby", key)
-                if stage.after_each is not None:
-                    yield "questionnaires", stage.after_each, (*loc, "after_each")
-            case _:
-                pass
+        for kind, name, loc in stage.names():
+            yield kind, name, ("stages", place, *loc)
 
 
 def names_of(config: StudyFile, kind: str) -> tuple[str, ...]:
@@ -311,7 +280,7 @@ def _factor_faults(factors: Mapping[str, Factor]) -> Iterator[Fault]:
             yield (name, "assign"), told, fix
 
 
-def _order_faults(stages: tuple[Stage, ...]) -> Iterator[Fault]:
+def _order_faults(stages: Sequence[Stage]) -> Iterator[Fault]:
     if not isinstance(stages[0], Consent):
         yield (0,), "the first stage is not consent", "start with `- {kind: consent, text: ...}`"
     if not isinstance(stages[-1], Debrief):
@@ -324,18 +293,18 @@ def _order_faults(stages: tuple[Stage, ...]) -> Iterator[Fault]:
             yield (place,), "a stage comes after debrief", "make debrief the last and only one"
 
 
-def _id_faults(stages: tuple[Stage, ...]) -> Iterator[Fault]:
+def _id_faults(stages: Sequence[Stage]) -> Iterator[Fault]:
     ids = stage_ids(stages)
     for place, stage_id in enumerate(ids):
         if stage_id in ids[:place]:
             yield (place, "id"), f"stage id '{stage_id}' stands twice", "give each stage its own id"
 
 
-def _comparison_faults(stages: tuple[Stage, ...]) -> Iterator[Fault]:
+def _comparison_faults(stages: Sequence[Stage]) -> Iterator[Fault]:
     for place, stage in enumerate(stages):
         if not isinstance(stage, Comparison):
             continue
-        met = played_as_written(stages[:place])
+        met = partners_as_written(stages[:place])
         if stage.agents is None:
             if len(met) != 2:
                 told = f"the rounds before this comparison have {len(met)} agents, not two"
@@ -349,6 +318,6 @@ def _comparison_faults(stages: tuple[Stage, ...]) -> Iterator[Fault]:
             yield (place, "agents"), "an agent is compared with itself", "name two agents"
 
 
-def played_as_written(stages: tuple[Stage, ...]) -> tuple[str, ...]:
-    """The partners of all rounds stages as the file writes them, each once."""
-    return tuple(dict.fromkeys(a for stage in stages if isinstance(stage, Rounds) for a in stage.agents))
+def partners_as_written(stages: Iterable[Stage]) -> tuple[str, ...]:
+    """The partners of all rounds as the file writes them, each once."""
+    return tuple(dict.fromkeys(agent for stage in stages for agent in stage.partners))
