@@ -17,8 +17,9 @@ from galley.study.stages.rounds import Rounds, Tutorial
 from galley.study.stages.stage import (
     OptionalStage,
     PageStage,
+    QuestionsStage,
     Stage,
-    answer_s,
+    TextStage,
     compares,
     questions_words,
     text_words,
@@ -40,7 +41,6 @@ from galley.study.written.questionnaire import Questionnaire
 if TYPE_CHECKING:
     from galley.study.study import Study
     from galley.study.visit.draft import Draft
-    from galley.study.written.study_file import StudyFile
 
 
 class ConsentStep(TextStep):
@@ -60,47 +60,15 @@ class ConsentStep(TextStep):
                 return None
 
 
-class Consent(Stage):
+class Consent(TextStage):
     """What the participant agrees to before anything else happens; they may decline."""
 
     becomes = (ConsentStep,)
+    guess_s = 60.0
 
     kind: Literal["consent"]
     text: TextName
     """A text of questionnaires/texts/; the hash of the exact words agreed to is stored."""
-
-    def steps(self, stage_id: str, draft: Draft) -> Iterator[Step]:
-        """The one page."""
-        title = self.title or draft.text_title(self.text)
-        yield ConsentStep(id=stage_id, title=title, **draft.text(self.text))
-
-    def description(self, study: Study) -> Iterator[str]:
-        """The text."""
-        yield text_words(study, self.text)
-
-    def seconds(self, config: StudyFile, questionnaires: Mapping[str, Questionnaire]) -> float:
-        """A guess."""
-        return 60.0
-
-
-class QuestionsStage(PageStage):
-    """A stage that asks the items of one questionnaire."""
-
-    questionnaire: QuestionnaireName
-
-    @property
-    def asks(self) -> str:
-        """The questionnaire."""
-        return self.questionnaire
-
-    def seconds(self, config: StudyFile, questionnaires: Mapping[str, Questionnaire]) -> float:
-        """A guess from the number of items."""
-        return self.within_limit(answer_s(config, questionnaires, self.questionnaire))
-
-    def asked(self, stage_id: str, draft: Draft) -> dict[str, Any]:
-        """What its step says in any case."""
-        title = self.title or draft.questions_title(self.questionnaire)
-        return {"id": stage_id, "title": title, **draft.questions(self.questionnaire), **self.rules()}
 
 
 class Questions(QuestionsStage):
@@ -112,14 +80,6 @@ class Questions(QuestionsStage):
     questionnaire: QuestionnaireName
     """A file of questionnaires/."""
 
-    def steps(self, stage_id: str, draft: Draft) -> Iterator[Step]:
-        """The page of the questions."""
-        yield QuestionnaireStep(**self.asked(stage_id, draft))
-
-    def description(self, study: Study) -> Iterator[str]:
-        """The questionnaire."""
-        yield questions_words(study, self.questionnaire)
-
 
 class InstructionsStep(ReadingStep):
     """A text to read."""
@@ -127,27 +87,15 @@ class InstructionsStep(ReadingStep):
     kind = "instructions"
 
 
-class Instructions(PageStage):
+class Instructions(TextStage, PageStage):
     """A text to read."""
 
     becomes = (InstructionsStep,)
+    guess_s = 90.0
 
     kind: Literal["instructions"]
     text: TextName
     """A text of questionnaires/texts/."""
-
-    def steps(self, stage_id: str, draft: Draft) -> Iterator[Step]:
-        """The page of the text."""
-        title = self.title or draft.text_title(self.text)
-        yield InstructionsStep(id=stage_id, title=title, **draft.text(self.text), **self.rules())
-
-    def description(self, study: Study) -> Iterator[str]:
-        """The text."""
-        yield text_words(study, self.text)
-
-    def seconds(self, config: StudyFile, questionnaires: Mapping[str, Questionnaire]) -> float:
-        """A guess."""
-        return self.within_limit(90.0)
 
 
 class QuizStep(QuestionnaireStep):
@@ -178,11 +126,11 @@ class Quiz(QuestionsStage):
     skippable: Literal[False] = False
     """A quiz may not be left out."""
 
-    def steps(self, stage_id: str, draft: Draft) -> Iterator[Step]:
-        """The page of the questions."""
+    def said(self, stage_id: str, draft: Draft) -> dict[str, Any]:
+        """The tries, and what may be looked at again, besides."""
         text = None if self.text is None else draft.resolve(self.text)
         tries = {"tries": self.tries, "after_last": self.after_last, "text": text}
-        yield QuizStep(**self.asked(stage_id, draft), **tries)
+        return super().said(stage_id, draft) | tries
 
     def description(self, study: Study) -> Iterator[str]:
         """The questionnaire, the tries, and what follows them."""
@@ -206,24 +154,23 @@ class Break(PageStage):
     """A rest; it lasts until the participant goes on, or until its time limit."""
 
     becomes = (BreakStep,)
+    guess_s = 60.0
 
     kind: Literal["break"]
     text: TextName | None = None
     """A text to show; a plain page of ours without it."""
 
-    def steps(self, stage_id: str, draft: Draft) -> Iterator[Step]:
-        """The page of the break."""
-        text = {} if self.text is None else draft.text(self.text)
-        title = draft.say("Time for a break") if self.text is None else draft.text_title(self.text)
-        yield BreakStep(id=stage_id, title=self.title or title, **text, **self.rules())
+    def heading(self, draft: Draft) -> str:
+        """That of the text, or one of ours."""
+        return draft.say("Time for a break") if self.text is None else draft.text_title(self.text)
+
+    def said(self, stage_id: str, draft: Draft) -> dict[str, Any]:
+        """The text besides, if there is one."""
+        return super().said(stage_id, draft) | ({} if self.text is None else draft.text(self.text))
 
     def description(self, study: Study) -> Iterator[str]:
         """The break, and its text."""
         yield "a break" if self.text is None else f"a break with {text_words(study, self.text)}"
-
-    def seconds(self, config: StudyFile, questionnaires: Mapping[str, Questionnaire]) -> float:
-        """A guess."""
-        return self.within_limit(60.0)
 
 
 class ScreenOutStep(Step):
@@ -248,10 +195,6 @@ class ScreenOut(OptionalStage):
             fix = "add a condition, such as `{item: survey.age, at_most: 17}`"
             raise faults([(("when",), "this ends the visit of everybody who comes here", fix)])
         return self
-
-    def steps(self, stage_id: str, draft: Draft) -> Iterator[Step]:
-        """The end for those who meet its condition."""
-        yield ScreenOutStep(id=stage_id, title=self.title, **self.rules())
 
     def description(self, study: Study) -> Iterator[str]:
         """What it does."""
@@ -294,13 +237,13 @@ class Comparison(QuestionsStage):
     agents: tuple[PartnerName, PartnerName] | None = None
     """The two partners, of those met; needed unless there were exactly two."""
 
-    def steps(self, stage_id: str, draft: Draft) -> Iterator[Step]:
-        """The page of the questions, the two partners in an order drawn."""
+    def said(self, stage_id: str, draft: Draft) -> dict[str, Any]:
+        """The two partners besides, in an order drawn."""
         agents = [draft.resolve(agent) for agent in self.agents or tuple(draft.hats)[:2]]
         order = (agents[place] for place in draft.by(FIRST)[0].permutation(2))
         first, second = (Side(hat=draft.hats[agent], agent=agent) for agent in order)
-        asked = self.asked(stage_id, draft)
-        yield ComparisonStep(**asked, human_hat=draft.human_hat, first=first, second=second)
+        sides = {"human_hat": draft.human_hat, "first": first, "second": second}
+        return super().said(stage_id, draft) | sides
 
     def description(self, study: Study) -> Iterator[str]:
         """The questionnaire and the partners."""
@@ -324,29 +267,21 @@ class DebriefStep(TextStep):
     redirect: str | None = None
 
 
-class Debrief(Stage):
+class Debrief(TextStage):
     """The end: a text and the completion code."""
 
     becomes = (DebriefStep,)
+    guess_s = 20.0
 
     kind: Literal["debrief"]
     text: TextName
     """A text of questionnaires/texts/, shown with the completion code."""
 
-    def steps(self, stage_id: str, draft: Draft) -> Iterator[Step]:
-        """The last page."""
-        title = self.title or draft.text_title(self.text)
+    def said(self, stage_id: str, draft: Draft) -> dict[str, Any]:
+        """The completion code and where to go besides."""
         end = draft.config.completion
-        text = draft.text(self.text)
-        yield DebriefStep(id=stage_id, title=title, **text, completion_code=end.code, redirect=end.redirect)
-
-    def description(self, study: Study) -> Iterator[str]:
-        """The text."""
-        yield text_words(study, self.text)
-
-    def seconds(self, config: StudyFile, questionnaires: Mapping[str, Questionnaire]) -> float:
-        """A guess."""
-        return 20.0
+        said = super().said(stage_id, draft)
+        return said | {"completion_code": end.code, "redirect": end.redirect}
 
 
 AnyStage = Annotated[

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, Self
@@ -10,7 +11,14 @@ from pydantic import Field, model_validator
 
 from galley.files.reading import FileModel, Loc, faults
 from galley.study.visit.steps import Step, Then
-from galley.study.written.factors import Condition, Conditions, Counted, levels_of
+from galley.study.written.factors import (
+    Condition,
+    Conditions,
+    Counted,
+    QuestionnaireName,
+    TextName,
+    levels_of,
+)
 from galley.study.written.languages import Words
 from galley.study.written.questionnaire import Questionnaire
 
@@ -32,6 +40,8 @@ class Stage(FileModel):
 
     becomes: ClassVar[tuple[type[Step], ...]]
     """The kinds of step that it becomes in a visit."""
+    guess_s: ClassVar[float] = 0.0
+    """A guess of how long it takes, where nothing in it decides that."""
 
     kind: str
     id: StageId | None = None
@@ -59,9 +69,17 @@ class Stage(FileModel):
         """The questionnaire whose answers later conditions may ask for."""
         return None
 
-    @abstractmethod
     def steps(self, stage_id: str, draft: Draft) -> Iterator[Step]:
-        """What the stage is to one visit."""
+        """What the stage is to one visit: one step that says `said`, unless its kind becomes several."""
+        yield self.becomes[0](**self.said(stage_id, draft))
+
+    def said(self, stage_id: str, draft: Draft) -> dict[str, Any]:
+        """The fields of its step."""
+        return {"id": stage_id, "title": self.title or self.heading(draft), **self.rules()}
+
+    def heading(self, draft: Draft) -> str:
+        """The heading of its page where the file gives it none."""
+        return ""
 
     @abstractmethod
     def description(self, study: Study) -> Iterator[str]:
@@ -69,7 +87,7 @@ class Stage(FileModel):
 
     def seconds(self, config: StudyFile, questionnaires: Mapping[str, Questionnaire]) -> float:
         """A guess of how long it takes those who meet all of it."""
-        return 0.0
+        return self.guess_s
 
     def names(self) -> Iterator[tuple[NamedKind, str, Loc]]:
         """(kind of thing, name, place in the stage) of all that it names; a name may be a `$factor`."""
@@ -161,9 +179,54 @@ class PageStage(OptionalStage):
         if self.at_least_s:
             yield f"at least {self.at_least_s} s"
 
-    def within_limit(self, seconds: float) -> float:
-        """So many seconds, or its time limit if that is shorter."""
-        return seconds if self.time_limit_s is None else min(seconds, self.time_limit_s)
+    def seconds(self, config: StudyFile, questionnaires: Mapping[str, Questionnaire]) -> float:
+        """A guess, cut at the time limit."""
+        return min(self.guess_s, self.time_limit_s or math.inf)
+
+
+class TextStage(Stage):
+    """A stage of one page that shows a text."""
+
+    text: TextName
+
+    def heading(self, draft: Draft) -> str:
+        """That of the text."""
+        return draft.text_title(self.text)
+
+    def said(self, stage_id: str, draft: Draft) -> dict[str, Any]:
+        """The text and the hash of its words besides."""
+        return super().said(stage_id, draft) | draft.text(self.text)
+
+    def description(self, study: Study) -> Iterator[str]:
+        """The text."""
+        yield text_words(study, self.text)
+
+
+class QuestionsStage(PageStage):
+    """A stage of one page that asks the items of a questionnaire."""
+
+    questionnaire: QuestionnaireName
+
+    @property
+    def asks(self) -> str:
+        """The questionnaire."""
+        return self.questionnaire
+
+    def heading(self, draft: Draft) -> str:
+        """That of the questionnaire."""
+        return draft.questions_title(self.questionnaire)
+
+    def said(self, stage_id: str, draft: Draft) -> dict[str, Any]:
+        """The questionnaire, the order of its items and the right answers besides."""
+        return super().said(stage_id, draft) | draft.questions(self.questionnaire)
+
+    def description(self, study: Study) -> Iterator[str]:
+        """The questionnaire."""
+        yield questions_words(study, self.questionnaire)
+
+    def seconds(self, config: StudyFile, questionnaires: Mapping[str, Questionnaire]) -> float:
+        """A guess from the number of items, cut at the time limit."""
+        return min(answer_s(config, questionnaires, self.questionnaire), self.time_limit_s or math.inf)
 
 
 def stage_ids(stages: Iterable[Stage]) -> tuple[str, ...]:
