@@ -51,19 +51,35 @@ def page() -> str:
     return re.sub(r"\{\{ (\w+) \}\}", lambda place: _table(place[1]), WORDS.read_text(encoding="utf-8"))
 
 
+def _items() -> str:
+    """Every kind of item: its docstring, what is stored, its keys."""
+    told = []
+    for model in ITEMS:
+        kind = get_args(model.model_fields["kind"].annotation)[0]
+        heading = "comparison of partners" if kind == "comparison" else kind  # a stage has that name too
+        words = [f"### {heading}", inspect.getdoc(model), f"Stored: {model.stored}.", _rows(_own(model))]
+        told.append("\n\n".join(str(part) for part in words))
+    return "\n\n".join(told)
+
+
 def _table(name: str) -> str:
+    if name == "Items":
+        return _items()
     if name in COMMON:
         model: type[FileModel] = kinds.Instructions if name == "Stage" else items.ShortText
         fields = {key: field for key, field in model.model_fields.items() if key in COMMON[name]}
         return _rows(fields)
-    model = MODELS[name]
+    return _rows(_own(MODELS[name]))
+
+
+def _own(model: type[FileModel]) -> dict[str, FieldInfo]:
+    """The keys of a model that are not told once for all."""
     shared = COMMON["Item"] if model in ITEMS else COMMON["Stage"] if model in STAGES else set()
-    told = {
+    return {
         key: field
         for key, field in model.model_fields.items()
         if key != "kind" and (key not in shared or field.is_required() or _overrides(model, key))
     }
-    return _rows(told)
 
 
 def _overrides(model: type[FileModel], key: str) -> bool:

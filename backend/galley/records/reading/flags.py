@@ -10,6 +10,7 @@ from typing import Any, Final
 from sqlalchemy import ColumnElement, Connection, Select, func, select
 
 from galley.records.database.tables import ABSENCES, RESPONSES, ROUNDS, SEATS, VISITS
+from galley.study.visit.plan import Plan
 
 # From here on a partner that stands still now and then may be felt.
 LATE_SHARE: Final = 0.01
@@ -73,8 +74,13 @@ def _hidden(connection: Connection, these: ColumnElement[bool]) -> Found:
 
 
 def _failed(connection: Connection, these: ColumnElement[bool]) -> Found:
-    query = _of(these, RESPONSES, func.count()).where(RESPONSES.c.passed.is_(False))
-    for visit, count in connection.execute(query.group_by(VISITS.c.id)):
+    query = _of(these, RESPONSES, VISITS.c.plan_json, RESPONSES.c.step_id)
+    counts: dict[int, int] = defaultdict(int)
+    for visit, plan, step_id in connection.execute(query.where(RESPONSES.c.passed.is_(False))):
+        # As the study counts them: the answers of a quiz that went on after its last try are no checks.
+        if (step_id, "quiz") not in {(step.id, step.kind) for step in Plan.from_json(plan).steps}:
+            counts[visit] += 1
+    for visit, count in counts.items():
         yield (
             visit,
             Flag("failed_checks", float(count), f"{count} checks failed" if count > 1 else "1 check failed"),

@@ -86,13 +86,16 @@ class Likert(_Rating):
 
 
 class SemanticDifferential(_Rating):
-    """A place between two opposite words, from 1 (low_label) to `scale` (high_label)."""
+    """A place between two opposite words, such as *dull* and *clever*, from 1 to `scale`."""
 
     kind: Literal["semantic_differential"]
 
 
 class Comparison(_Scale):
-    """Preference between two partners, from 1 (strongly the first) to `scale` (strongly the second)."""
+    """Preference between two partners, from 1 (strongly the first) to `scale` (strongly the second).
+
+    The item kind is `comparison`, for comparison stages only.
+    """
 
     compares = True
     stored = (
