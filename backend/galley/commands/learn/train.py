@@ -21,7 +21,7 @@ def _parameters() -> Iterator[inspect.Parameter]:
     """The parameters of `galley learn train`: the method and a row of the table of options each."""
     kinds = get_type_hints(TrainingOptions)
     names = StrEnum("Method", {name: name for name in METHODS})  # type: ignore[misc]  # mypy wants a literal
-    named = typer.Argument(metavar="METHOD", help=" ".join(METHODS))
+    named = typer.Argument(metavar="METHOD", help="How to train: a method of docs/learning.md.")
     yield inspect.Parameter("method", inspect.Parameter.KEYWORD_ONLY, annotation=Annotated[names, named])
     for name, (field, option) in asked_options().items():
         kind, default = (kinds[name], field.default) if option.kind is None else (option.kind, None)
