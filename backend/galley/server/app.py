@@ -19,6 +19,7 @@ from galley.server.clock import Clock
 from galley.server.content import Content
 from galley.server.garbage_collection import collect_between_rounds, few_collections
 from galley.server.headers import HEADERS, SecureHeaders
+from galley.server.limits import PerAddress
 from galley.server.participant.pages import NO_PAGE, NOT_FOUND, Pages
 from galley.server.participant.time_limits import TimeLimits
 from galley.server.participant.visits import Visits
@@ -63,8 +64,9 @@ def create_app(content: Content, store: Store, settings: Settings, *, preview: b
         clock,
         environment,
         settings.max_form_kib * 1024,
+        settings.begins_per_min,
     )
-    play = Play(visits, matches, settings.messages_per_s)
+    play = Play(visits, matches, settings.messages_per_s, settings.address_messages_per_s)
 
     time_limits = TimeLimits(store, studies, visits, matches, clock)
 
@@ -96,6 +98,8 @@ def create_app(content: Content, store: Store, settings: Settings, *, preview: b
     )
     app.add_api_websocket_route("/v/{token}/play", play.endpoint)
     app.mount("/static", Static(directory=frontend), name="static")
+    if settings.requests_per_s:
+        app.add_middleware(PerAddress, per_s=settings.requests_per_s)
     app.add_middleware(SecureHeaders)
 
     async def not_here(_request: Request, error: Exception) -> Response:

@@ -23,7 +23,7 @@ async def read_form(request: Request, max_bytes: int) -> Mapping[str, list[str]]
     """Every field of the request's form with its values in order; blank ones are kept.
 
     Raises:
-        FormError: it is not urlencoded, longer than `max_bytes`, breaks off, or has more than MAX_FIELDS fields.
+        FormError: it is not urlencoded, longer than `max_bytes`, breaks off, or has over MAX_FIELDS fields.
     """
     kind = request.headers.get("content-type", FORM_TYPE).split(";")[0].strip().lower()
     if kind != FORM_TYPE:

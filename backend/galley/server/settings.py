@@ -50,9 +50,26 @@ class Settings:
     messages_per_s: int = _row(
         200,
         "MESSAGES_PER_S",
-        "Websocket messages a second that one connection may keep up.",
+        "Websocket messages a second that the connections of one visit may keep up.",
         10,
         10_000,
+    )
+    address_messages_per_s: int = _row(
+        2000,
+        "ADDRESS_MESSAGES_PER_S",
+        "The same for all connections of one address; an IPv6 /64 counts as one.",
+        10,
+        1_000_000,
+    )
+    requests_per_s: int = _row(
+        300,
+        "REQUESTS_PER_S",
+        "Requests a second that one address may keep up; more wait their turn. 0 sets no limit.",
+        0,
+        1_000_000,
+    )
+    begins_per_min: int = _row(
+        240, "BEGINS_PER_MIN", "Visits that one address may begin in a minute; 0 sets no limit.", 0, 1_000_000
     )
     log_level: str = _row("warning", "LOG_LEVEL", "How much is logged: error, warning, info or debug.")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import random
 import re
 import subprocess
@@ -33,6 +34,8 @@ from galley.workspace import Workspace
 
 PAGE_TIMEOUT_S = 60.0
 STOP_WITHIN_S = 20.0
+UNLIMITED = {"REQUESTS_PER_S": "0", "BEGINS_PER_MIN": "0", "ADDRESS_MESSAGES_PER_S": "1000000"}
+"""Settings of a server of one's own: all simulated participants come from one address."""
 
 
 @dataclass(frozen=True)
@@ -143,7 +146,9 @@ def own_server(workspace: Workspace, study: str) -> Iterator[str]:
         command += ["--study", study, "--port", "0", "--database", str(Path(folder) / "simulated.sqlite")]
         with (
             log.open("wb") as out,
-            subprocess.Popen(command, stdout=out, stderr=subprocess.STDOUT) as process,  # noqa: S603
+            subprocess.Popen(  # noqa: S603
+                command, stdout=out, stderr=subprocess.STDOUT, env={**os.environ, **UNLIMITED}
+            ) as process,
         ):
             try:
                 yield _address(process, log)

@@ -66,7 +66,7 @@ def begin(
 def slots(connection: Connection, study: str) -> list[SlotRow]:
     """Every slot of a study that was ever given out, in order of number."""
     query = (
-        select(SLOTS, VISITS.c.status, VISITS.c.last_seen_ms)
+        select(SLOTS, VISITS.c.status, VISITS.c.last_seen_ms, VISITS.c.step_index)
         .outerjoin(VISITS, VISITS.c.id == SLOTS.c.visit_id)
         .where(SLOTS.c.study == study)
         .order_by(SLOTS.c.number)
@@ -79,6 +79,7 @@ def slots(connection: Connection, study: str) -> list[SlotRow]:
             last_seen_ms=row["held_at_ms"] if row["last_seen_ms"] is None else row["last_seen_ms"],
             cell=row["cell"],
             visit_id=row["visit_id"],
+            answered=row["step_index"] != 0,
         )
         for row in connection.execute(query).mappings()
     ]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 from urllib.parse import quote, urlencode
@@ -15,6 +17,7 @@ from galley.records import Store
 from galley.server.clock import Clock
 from galley.server.form_decoding import FormError, read_form
 from galley.server.headers import same_origin
+from galley.server.limits import Paces, network_of
 from galley.server.participant.step_context import (
     common_context,
     ending_context,
@@ -34,6 +37,7 @@ from galley.study.written.languages import choose_language
 from galley.study.written.questionnaire import validate_answers
 from galley.translations import language_name, mark
 
+LOG = logging.getLogger(__name__)
 MAX_LINK_PARAMS = 30
 MAX_LINK_PARAM_CHARS = 200
 NEVER_CACHED = {"cache-control": "no-store"}
@@ -57,6 +61,10 @@ UNINVITED = mark(
 UNTESTED = mark(
     "This test link is not good any more. Please make a new one on the study's page for researchers."
 )
+NOT_YET = mark("Not yet")
+CROWDED = mark(
+    "Many people are beginning from your network just now. Please go back, wait a minute, and try again."
+)
 
 
 class Pages:
@@ -72,6 +80,7 @@ class Pages:
         clock: Clock,
         templates: jinja2.Environment,
         max_form_bytes: int,
+        begins_per_min: int = 0,
     ) -> None:
         self._studies = studies
         self._visits = visits
@@ -81,6 +90,7 @@ class Pages:
         self._clock = clock
         self._templates = templates
         self._max_form_bytes = max_form_bytes
+        self._begins = Paces(begins_per_min / 60.0, burst=begins_per_min) if begins_per_min else None
 
     def router(self) -> APIRouter:
         """The routes of all pages."""
@@ -159,10 +169,30 @@ class Pages:
             return self.plain(error.status, NOT_USED, UNREADABLE)
         chosen = form.get(LANGUAGE_PARAM, [""])[0]
         language = chosen if chosen in found.languages else _language(found, request)
+        wait_s = self._begin_wait_s(request)
+        if wait_s > 0:
+            page = self.plain(429, NOT_YET, CROWDED, language)
+            page.headers["retry-after"] = str(math.ceil(wait_s))
+            return page
         begun = await self._visits.begin(found, _link_params(request), language)
         if not isinstance(begun, Visit):
             return self._not_begun(found.in_language(language), begun)
         return RedirectResponse(begun.url, 303, NEVER_CACHED)
+
+    def _begin_wait_s(self, request: Request) -> float:
+        """How long the address of a request has to wait until it may begin another visit."""
+        address = network_of(request.client.host) if request.client else ""
+        if self._begins is None or not address:
+            return 0.0
+        now_s = self._clock.now()
+        wait_s = self._begins.of(address, now_s).wait_s(now_s, patience_s=0.0)
+        if wait_s > 0:
+            LOG.warning(
+                "more visits begin at the address %s than BEGINS_PER_MIN lets; "
+                "if that is a proxy, let it pass on X-Forwarded-For",
+                address,
+            )
+        return wait_s
 
     # ---- a visit -------------------------------------------------------------------------------------------
 

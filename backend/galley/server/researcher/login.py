@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import secrets
+from collections import deque
 from collections.abc import Awaitable, Callable, Mapping
 from urllib.parse import quote
 
@@ -17,7 +18,13 @@ from galley.records.store.researcher_accounts import Researchers
 from galley.server.clock import Clock
 from galley.server.form_decoding import FormError, read_form
 from galley.server.headers import same_origin
-from galley.server.researcher.login_throttle import Throttle
+from galley.server.limits import network_of
+from galley.server.researcher.login_throttle import (
+    FREE_TRIES_OF_A_NAME,
+    LONGEST_WAIT_OF_A_NAME_S,
+    MOST_KEPT,
+    Throttle,
+)
 from galley.server.researcher.passwords import LONGEST, LONGEST_NAME, Passwords
 
 HOME = "/researcher"
@@ -47,6 +54,10 @@ class Logins:
         self._clock = clock
         self._passwords = Passwords()
         self._throttle = Throttle()
+        # Whoever guesses from ever new addresses is slowed by the name, but cannot keep its owner out for
+        # long, nor at all where the owner has logged in before.
+        self._names = Throttle(FREE_TRIES_OF_A_NAME, LONGEST_WAIT_OF_A_NAME_S)
+        self._known: deque[str] = deque(maxlen=MOST_KEPT)
         # One at a time: each check takes 19 MiB and some milliseconds of a core.
         self._checking = asyncio.Semaphore(1)
 
@@ -124,20 +135,29 @@ class Logins:
         back, name = first(form, "next"), first(form, "name").strip()[:LONGEST_NAME]
         if not _same(first(form, "csrf"), request.cookies.get(FORM_COOKIE, "")):
             return await self._login_form(request, 403, back, name, OLD_FORM)
-        address = request.client.host if request.client else ""
-        keys = (f"address {address}", f"name {name.casefold()} at {address}")
-        wait_s = max(self._throttle.wait_s(key, self._clock.now()) for key in keys)
+        host = request.client.host if request.client else ""
+        address = network_of(host) or host
+        here = f"name {name.casefold()} at {address}"
+        keys = (f"address {address}", here)
+        now_s = self._clock.now()
+        wait_s = max(self._throttle.wait_s(key, now_s) for key in keys)
+        if here not in self._known:
+            wait_s = max(wait_s, self._names.wait_s(name.casefold(), now_s))
         if wait_s > 0:
             told = f"Too many wrong logins. Wait {round(wait_s + 0.5)} seconds, then try again."
             return await self._login_form(request, 429, back, name, told)
         # Counted before it is looked at: guesses sent side by side cannot slip through together.
         for key in keys:
-            self._throttle.failed(key, self._clock.now())
+            self._throttle.failed(key, now_s)
+        self._names.failed(name.casefold(), now_s)
         researcher = await self._researcher(name, first(form, "password"))
         if researcher is None:
             return await self._login_form(request, 403, back, name, WRONG)
         for key in keys:
             self._throttle.succeeded(key)
+        self._names.succeeded(name.casefold())
+        if here not in self._known:
+            self._known.append(here)
         now_ms = self._clock.ms()
         token = await asyncio.wrap_future(
             self._researchers.open_session(researcher.id, now_ms, now_ms + SESSION_S * 1000.0)

@@ -6,11 +6,12 @@ import asyncio
 import logging
 from collections import deque
 
+from starlette.responses import Response
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from galley.protocol import messages as wire
 from galley.server.headers import same_origin
-from galley.server.limits import Pace
+from galley.server.limits import Paces, network_of
 from galley.server.participant.visits import Visits
 from galley.server.rounds.match import LEFT, RESTART
 from galley.server.rounds.matches import Matches, Place, RoundBusy
@@ -19,6 +20,9 @@ from galley.server.rounds.round_journal import Handed
 
 LOG = logging.getLogger(__name__)
 MAX_BEHIND = 200
+MOST_SOCKETS = 4
+SOCKETS_PER_S = 1.0
+SOCKETS_AT_ONCE = 20
 HELLO_WITHIN_S = 20.0
 CLOSE_WITHIN_S = 5.0
 SERVICE_RESTART = 1012  # RFC 6455 registry: the server is going down; browsers cannot send it
@@ -88,18 +92,28 @@ class Socket:
 class Play:
     """The endpoint of all play sockets."""
 
-    def __init__(self, visits: Visits, matches: Matches, messages_per_s: int) -> None:
+    def __init__(
+        self, visits: Visits, matches: Matches, messages_per_s: int, address_messages_per_s: int
+    ) -> None:
         self._visits = visits
         self._matches = matches
-        self._messages_per_s = messages_per_s
+        self._of_visit = Paces(messages_per_s)
+        self._of_address = Paces(address_messages_per_s)
+        self._arrivals = Paces(SOCKETS_PER_S, SOCKETS_AT_ONCE)
+        self._open: dict[str, list[Socket]] = {}
 
     async def endpoint(self, websocket: WebSocket, token: str) -> None:
         """One connection from handshake to close; a foreign page or an unknown link gets 403."""
+        now_s = asyncio.get_running_loop().time()
+        if self._arrivals.of(token, now_s).wait_s(now_s, patience_s=0.0) > 0:
+            await websocket.send_denial_response(Response(status_code=429))
+            return
         if not same_origin(websocket.headers) or await self._visits.find(token) is None:
             await websocket.close()
             return
         await websocket.accept()
         socket = Socket(websocket)
+        self._enter(token, socket)
         sender = asyncio.create_task(socket.run())
         reason = LEFT
         try:
@@ -110,10 +124,36 @@ class Play:
             if socket.place is not None:
                 socket.place.match.leave(socket, reason)
             sender.cancel()
+            self._leave(token, socket)
+
+    def _enter(self, token: str, socket: Socket) -> None:
+        """Count a socket of a visit; the oldest that plays no round makes room for one too many."""
+        there = self._open.setdefault(token, [])
+        there.append(socket)
+        if len(there) > MOST_SOCKETS:
+            idle = (one for one in there if one.place is None or one.place.person.connection is not one)
+            oldest = next(idle)
+            there.remove(oldest)
+            oldest.close(wire.CLOSE_REPLACED)
+
+    def _leave(self, token: str, socket: Socket) -> None:
+        there = self._open.get(token, [])
+        if socket in there:
+            there.remove(socket)
+        if not there:
+            self._open.pop(token, None)
 
     async def _listen(self, websocket: WebSocket, socket: Socket, token: str) -> str:
         loop = asyncio.get_running_loop()
-        pace = Pace(self._messages_per_s, loop.time())
+        address = network_of(websocket.client.host) if websocket.client else ""
+        paces = [self._of_visit.of(token, loop.time())]
+        if address:
+            paces.append(self._of_address.of(address, loop.time()))
+
+        async def paced() -> None:
+            for pace in paces:
+                await pace.wait()
+
         hello_by_s = loop.time() + HELLO_WITHIN_S
         last_seq = -1
         while True:
@@ -141,7 +181,7 @@ class Play:
                     busy = await self._hello(socket, token, message)
                     if busy is not None and busy.address and RELAYED not in websocket.headers:
                         path = websocket.url.path
-                        code = await pass_on(websocket, busy.address, path, frame, pace.wait)
+                        code = await pass_on(websocket, busy.address, path, frame, paced)
                         socket.close(code)
                     elif busy is not None:
                         socket.close(wire.CLOSE_BUSY)
@@ -153,7 +193,7 @@ class Play:
                     _pass_on(socket.place, socket, message, arrival_s)
             except wire.MessageError as error:
                 socket.send(wire.encode("refused", reason=str(error)))
-            await pace.wait()
+            await paced()
 
     async def _hello(self, socket: Socket, token: str, hello: wire.Hello) -> RoundBusy | None:
         """Give the socket its place, or close it, or say that another process has the round.

@@ -10,7 +10,7 @@ slots as the quota allows are completed, every cell has exactly its quota.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import product
 from typing import TYPE_CHECKING, Final
 
@@ -26,15 +26,21 @@ CELLS: Final = 1
 DRAWN: Final = 2
 """First numbers of the tags of what is balanced over slots; the design of stages uses 3."""
 
+UNANSWERED_MS: Final = 15 * 60_000.0
+"""After which the slot of a visit that never went beyond its first step is free at the latest."""
+
 
 @dataclass(frozen=True, slots=True)
 class Slot:
-    """A slot that was given out: `ended` says that its visit is over without having completed it."""
+    """A slot that was given out: `ended` says that its visit is over without having completed it, `answered`
+    that its visit has left its first step.
+    """
 
     number: int
     completed: bool
     ended: bool
     last_seen_ms: float
+    answered: bool = field(default=True, kw_only=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +62,8 @@ def allocate(slots: Iterable[Slot], now_ms: float, expires_ms: float, capacity: 
     """The slot for an arrival at `now_ms`: the lowest one that came free, else the next, else none.
 
     `slots` are all that were ever given out, each once, by its last holder. `expires_ms` without a sign of
-    life set a slot free. `capacity` is the number of slots in all, or None for no end.
+    life set a slot free, or UNANSWERED_MS if its visit never answered. `capacity` is the number of
+    slots in all, or None for no end.
     """
     given = 0
     completed = 0
@@ -64,7 +71,8 @@ def allocate(slots: Iterable[Slot], now_ms: float, expires_ms: float, capacity: 
     for slot in slots:
         given = max(given, slot.number + 1)
         completed += slot.completed
-        gone = slot.ended or now_ms - slot.last_seen_ms >= expires_ms
+        kept_ms = expires_ms if slot.answered else min(expires_ms, UNANSWERED_MS)
+        gone = slot.ended or now_ms - slot.last_seen_ms >= kept_ms
         if not slot.completed and gone and (free is None or slot.number < free):
             free = slot.number
     if free is not None:
