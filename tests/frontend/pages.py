@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 from galley.outcomes import VISIT_OUTCOMES
 from galley.server.templates import translated_templates
 from galley.study.written.questionnaire import Questionnaire
+from tests.study.stages.kinds import KINDS
 
 FRONTEND = Path(__file__).parents[2] / "frontend"
 HOSTILE = "<script>alert(1)</script>\"'><img src=x onerror=alert(1)>"
@@ -80,7 +82,12 @@ def contexts(words: str = HOSTILE) -> dict[str, dict[str, Any]]:
         "skippable": True,
     }
     end = {"html": "<p>1</p>", "completion_code": words, "redirect": LEAVING}
-    return {
+    every_kind = {
+        f"{kind.step}.html": visit(kind.step, html="<p>1</p>", **(_in_words(kind.page, words) | clock))
+        for kind in KINDS.values()
+        if kind.step != "screen_out"
+    }
+    return every_kind | {
         "landing.html": {
             "study": study,
             "minutes": 12,
@@ -88,7 +95,7 @@ def contexts(words: str = HOSTILE) -> dict[str, dict[str, Any]]:
             "language": "en",
             "languages": [*offered, {"code": "zh", "name": words, "url": "/s/demo?language=zh"}],
         },
-        "studies.html": {"studies": [study]},
+        "studies.html": {"studies": [study], "query": ""},
         "plain.html": {"title": words, "message": words, "status": 404},
         "ending.html": {"study": study, "outcome": "declined", "code": words, "redirect": LEAVING},
         "consent.html": visit("consent", html="<p>1</p>"),
@@ -104,6 +111,14 @@ def contexts(words: str = HOSTILE) -> dict[str, dict[str, Any]]:
         ),
         "round.html": visit("round", **round_page),
         "debrief.html": visit("debrief", **end),
+    }
+
+
+def _in_words(page: Mapping[str, Any], words: str) -> dict[str, Any]:
+    """What a page of its own kind is given, all words of it the same; hats are no words."""
+    return {
+        key: words if isinstance(value, str) and not key.endswith("hat") else value
+        for key, value in page.items()
     }
 
 

@@ -101,7 +101,7 @@ def _pages() -> Iterator[tuple[str, str, dict[str, object]]]:
     answered = {"problems": {"age": "1", "one": "1"}, "early": False}
     yield "questionnaire problems", "questionnaire.html", base["questionnaire.html"] | answered
     yield "quiz fresh", "quiz.html", base["quiz.html"] | {"wrong": {}, "tries_left": 1}
-    yield "studies none", "studies.html", {"studies": []}
+    yield "studies none", "studies.html", {"studies": [], "query": ""}
 
 
 @pytest.mark.parametrize(("template", "values"), [pytest.param(*page[1:], id=page[0]) for page in _pages()])

@@ -62,9 +62,20 @@ def _items() -> str:
     return "\n\n".join(told)
 
 
+def _stages() -> str:
+    """Every kind of stage: its docstring, its keys."""
+    return "\n\n".join(
+        f"### {get_args(model.model_fields['kind'].annotation)[0]}\n\n{inspect.getdoc(model)}\n\n"
+        + _table(model.__name__)
+        for model in STAGES
+    )
+
+
 def _table(name: str) -> str:
     if name == "Items":
         return _items()
+    if name == "Stages":
+        return _stages()
     if name in COMMON:
         model: type[FileModel] = kinds.Instructions if name == "Stage" else items.ShortText
         fields = {key: field for key, field in model.model_fields.items() if key in COMMON[name]}

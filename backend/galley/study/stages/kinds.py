@@ -72,7 +72,7 @@ class Consent(TextStage):
 
 
 class Questions(QuestionsStage):
-    """A questionnaire that does not concern one round."""
+    """A questionnaire that does not concern one round, such as a survey; there may be any number of them."""
 
     becomes = (QuestionnaireStep,)
 
@@ -110,7 +110,10 @@ class QuizStep(QuestionnaireStep):
 
 
 class Quiz(QuestionsStage):
-    """Questions with one right answer each, asked again until all are right or the tries are used up."""
+    """Questions with one right answer each, asked again until all are right or the tries are used up.
+
+    After a wrong answer the page shows the `hint` of its item.
+    """
 
     becomes = (QuizStep,)
 
@@ -181,7 +184,7 @@ class ScreenOutStep(Step):
 
 
 class ScreenOut(OptionalStage):
-    """Ends the visit of those who meet its condition."""
+    """Ends the visit of those who meet its condition, with the code and the page of [endings](#endings)."""
 
     becomes = (ScreenOutStep,)
 
@@ -227,7 +230,10 @@ class ComparisonStep(QuestionsStep):
 
 
 class Comparison(QuestionsStage):
-    """A questionnaire that compares two partners by hat colour; which is first is drawn for each visit."""
+    """A questionnaire that compares two partners by the colours of their hats.
+
+    Which is called the first is drawn for each visit and stored with the answers.
+    """
 
     becomes = (ComparisonStep,)
 

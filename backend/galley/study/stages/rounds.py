@@ -102,7 +102,10 @@ class Lobby(FileModel):
 
 
 class Tutorial(OptionalStage):
-    """A round for getting used to the kitchen, whose score does not count; with agent `none` it is alone."""
+    """A round for getting used to the kitchen, whose score does not count; with agent `none` it is alone.
+
+    Its partner wears a hat that no other partner wears.
+    """
 
     becomes = (RoundStep,)
 
@@ -165,12 +168,7 @@ class Tutorial(OptionalStage):
 class Rounds(OptionalStage):
     """Every agent on every layout, one round each, with a questionnaire after each.
 
-    Rounds come in blocks: all agents on one layout, then the next layout (`blocks: layout`), or all layouts
-    with one agent, then the next agent (`blocks: agent`). An order is as written (`fixed`), drawn for each
-    visit (`random`), a row of a Latin square (`latin_square`), or one of all there are, each equally often
-    (`full`). What comes inside the blocks has an order of its own in every block. With `pairs` other than
-    `all` each layout is played once, with one of the agents. The participant's seat belongs to a layout
-    (`per_layout`: every agent is met from the same place), to a round (`per_round`), or is given.
+    [Balance](#balance) tells how rounds are ordered, which agent is met on which layout, and who sits where.
     """
 
     becomes = (RoundStep, QuestionnaireStep)
