@@ -28,8 +28,8 @@ from galley.kitchen import Kitchen, Layout  # noqa: E402
 from galley.kitchen.layout_file import load_layout  # noqa: E402
 from galley.kitchen.measures import measures  # noqa: E402
 from galley.planning.centralized import Centralized  # noqa: E402
-from galley.planning.joint_motion import JointMotion  # noqa: E402
 from galley.planning.robots import QMDP  # noqa: E402
+from tests.planning.joint_motion import JointMotion  # noqa: E402
 from tests.planning.package import package_planner  # noqa: E402
 
 COMMAND = "python benchmarks/planning.py"

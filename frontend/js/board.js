@@ -23,7 +23,7 @@
  * @property {number} steps cells walked so far: the feet alternate
  */
 /** @typedef {{thing: number, at: number}} Lying a thing on a counter and when it came there */
-/** @typedef {{kind: number, count: number, ticks: number, ready: boolean, at: number}} Pot `at`: last change of contents */
+/** @typedef {{onions: number, tomatoes: number, ticks: number, ready: boolean, at: number}} Pot `at`: last change of contents */
 /** @typedef {{kind: "points" | "sparkle" | "splash" | "puff", x: number, y: number, at: number, text: string}} Effect */
 
 /**
@@ -83,8 +83,8 @@ export function boardFrom(frame, you = "") {
     seat: frame.seat, hats: frame.hats, grid: frame.grid, cookTime: frame.cook_time,
     chefs: [standing(frame.chefs[0]), standing(frame.chefs[1])],
     things: new Map(frame.things.filter((row) => row[2]).map(([x, y, thing]) => [cellKey(x, y), { thing, at: NEVER }])),
-    pots: new Map(frame.pots.map(([x, y, kind, count, ticks, ready]) =>
-      [cellKey(x, y), { kind, count, ticks, ready: Boolean(ready), at: NEVER }])),
+    pots: new Map(frame.pots.map(([x, y, onions, tomatoes, ticks, ready]) =>
+      [cellKey(x, y), { onions, tomatoes, ticks, ready: Boolean(ready), at: NEVER }])),
     score: frame.score, scoredAt: NEVER, goal: frame.goal, round: frame.round, of: frame.of,
     tutorial: frame.tutorial, orders: frame.orders, effects: [],
     points: frame.points ?? null, episode: frame.episode ?? 1, episodes: frame.episodes ?? 1,
@@ -124,10 +124,10 @@ export function applyTick(board, message, now) {
     if (thing) board.things.set(cellKey(x, y), { thing, at: now });
     else board.things.delete(cellKey(x, y));
   }
-  for (const [x, y, kind, count, ticks, ready] of message.pots) {
+  for (const [x, y, onions, tomatoes, ticks, ready] of message.pots) {
     const before = board.pots.get(cellKey(x, y));
-    const changed = before?.count !== count || before.kind !== kind || before.ready !== Boolean(ready);
-    board.pots.set(cellKey(x, y), { kind, count, ticks, ready: Boolean(ready), at: changed ? now : before.at });
+    const changed = before?.onions !== onions || before.tomatoes !== tomatoes || before.ready !== Boolean(ready);
+    board.pots.set(cellKey(x, y), { onions, tomatoes, ticks, ready: Boolean(ready), at: changed ? now : before.at });
   }
   const gained = message.score - board.score;
   if (gained !== 0) board.scoredAt = now;

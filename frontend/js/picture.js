@@ -35,7 +35,7 @@ function starts(rows) {
  */
 function potsOf(grid, busy) {
   const places = grid.flatMap((row, y) => [...row].flatMap((tile, x) => (tile === "P" ? [[x, y]] : [])));
-  return places.map(([x = 0, y = 0], i) => (busy ? [x, y, 1, 3, i % 2 ? 20 : 13, i % 2 === 1] : [x, y, 0, 0, 0, false]));
+  return places.map(([x = 0, y = 0], i) => (busy ? [x, y, 3, 0, i % 2 ? 20 : 13, i % 2 === 1] : [x, y, 0, 0, 0, false]));
 }
 
 /** @param {HTMLElement} figure @param {Map<string, HTMLImageElement>} images */

@@ -16,7 +16,8 @@ export function drawPot(context, board, pot, x, y, sprites, now, quiet) {
   const s = sprites.tile;
   const drop = middle(board.grid, x, y) - 0.38;
   const [mx, my] = [(x + 0.5) * s, (y + 0.36 + drop) * s];
-  const cooking = pot.count === INGREDIENTS && !pot.ready;
+  const count = pot.onions + pot.tomatoes;
+  const cooking = count === INGREDIENTS && !pot.ready;
   if (cooking || pot.ready) ring(context, mx, my, s, pot.ready ? 1 : pot.ticks / board.cookTime, pot.ready, quiet ? 1 : pulse(now, 900));
   const heat = cooking ? 1 : 0.62;
   for (const [i, dx] of [-0.17, 0.17, 0].entries()) {
@@ -28,18 +29,19 @@ export function drawPot(context, board, pot, x, y, sprites, now, quiet) {
   const size = 0.84 * (quiet ? 1 : 1 + 0.1 * Math.sin(Math.PI * share(now, pot.at, 200)));
   const box = /** @type {const} */ ([mx - (size / 2) * s, my - (0.42 + (size - 0.84) - wobble) * s, size * s, size * s]);
   context.drawImage(sprites.get("pot"), ...box);
-  const name = pot.kind === 2 ? "tomato" : "onion";
+  /** @type {string[]} */
+  const names = [...Array(pot.onions).fill("onion"), ...Array(pot.tomatoes).fill("tomato")];
   const [px, py] = [box[0], box[1]];
-  if (cooking || pot.ready) context.drawImage(sprites.get(`broth-${name}`), ...box);
+  if (cooking || pot.ready) context.drawImage(sprites.get(`broth-${pot.tomatoes > pot.onions ? "tomato" : "onion"}`), ...box);
   if (!pot.ready) {
     const spots = /** @type {const} */ ([[0.35, 0.255], [0.65, 0.26], [0.5, 0.31]]);
-    for (const [i, [sx, sy]] of spots.slice(0, pot.count).entries()) {
+    for (const [i, [sx, sy]] of spots.slice(0, count).entries()) {
       const float = cooking && !quiet ? 0.012 * Math.sin(now / 190 + i * 2) : 0;
       const w = 0.27 * s;
-      context.drawImage(sprites.get(name), px + sx * size * s - w / 2, py + (sy + float) * size * s - w * 0.62, w, w);
+      context.drawImage(sprites.get(names[i] ?? "onion"), px + sx * size * s - w / 2, py + (sy + float) * size * s - w * 0.62, w, w);
     }
   }
-  if (pot.count > 0 && !pot.ready) pips(context, mx, py + 0.63 * size * s, s, pot);
+  if (count > 0 && !pot.ready) pips(context, mx, py + 0.63 * size * s, s, pot);
   if (pot.ready) {
     steam(context, sprites, mx, my - 0.2 * s, s, now, quiet);
     const lift = quiet ? 0 : 0.03 * pulse(now, 900) * s;
@@ -75,7 +77,7 @@ function pips(context, x, y, s, pot) {
   for (let i = 0; i < INGREDIENTS; i += 1) {
     context.beginPath();
     context.arc(x + (i - 1) * 0.135 * s, y, 0.048 * s, 0, 2 * Math.PI);
-    context.fillStyle = i < pot.count ? (pot.kind === 2 ? "#e0402c" : "#f0a83c") : "#f4f6f8";
+    context.fillStyle = i < pot.onions ? "#f0a83c" : i < pot.onions + pot.tomatoes ? "#e0402c" : "#f4f6f8";
     context.fill();
     context.lineWidth = 0.022 * s;
     context.strokeStyle = "#3b2418";

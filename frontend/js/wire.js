@@ -3,7 +3,7 @@
  * The server's table of messages is the truth; a test holds these names against it.
  */
 
-export const PROTOCOL = 1;
+export const PROTOCOL = 2;
 
 /** Every message type the page sends. */
 export const CLIENT_TYPES = /** @type {const} */ (["hello", "ready", "key", "release", "ping"]);
@@ -24,7 +24,7 @@ export const CLOSE = Object.freeze({ elsewhere: 4001, over: 4002, refused: 4003 
 /** @typedef {"waiting" | "countdown" | "playing" | "paused" | "ended"} Phase */
 /** @typedef {[x: number, y: number, facing: number, held: number]} ChefRow cell, facing 0-3 = N S E W, thing code */
 /** @typedef {[x: number, y: number, thing: number]} ThingRow thing 0 clears the cell */
-/** @typedef {[x: number, y: number, kind: number, count: number, ticks: number, ready: boolean | number]} PotRow */
+/** @typedef {[x: number, y: number, onions: number, tomatoes: number, ticks: number, ready: boolean | number]} PotRow */
 /** @typedef {[kind: string, seat: number | null, thing: string | number | null, place: string | null, x: number, y: number]} EventRow */
 
 /**

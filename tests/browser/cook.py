@@ -34,8 +34,8 @@ class Cook:
         self.tick: int = frame["tick"]
         self._chefs: Sequence[list[int]] = frame["chefs"]
         self._things.update({(x, y): thing for x, y, thing in frame["things"]})
-        for x, y, kind, count, ticks, ready in frame["pots"]:
-            self._pots[x, y] = PotView(kind, count, ticks, bool(ready))
+        for x, y, onions, tomatoes, ticks, ready in frame["pots"]:
+            self._pots[x, y] = PotView(onions, tomatoes, ticks, bool(ready))
 
     def next_key(self) -> str | None:
         """The key to press for the next tick, or None to wait."""

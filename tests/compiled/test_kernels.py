@@ -34,8 +34,8 @@ import galley.kitchen
 print(galley.kitchen.__file__)
 layout = galley.kitchen.Layout.from_ascii("l", "XPOX\\nX12X\\nXDSX")
 print(galley.kitchen.Kitchen(layout).step(4, 4))
-from galley.kitchen.rules import classic
-print(classic.step.stats.cache_path)
+from galley.kitchen.rules import tick
+print(tick.step.stats.cache_path)
 """
 
 
@@ -43,7 +43,7 @@ print(classic.step.stats.cache_path)
 def copied(tmp_path: Path) -> Path:
     """A folder with a copy of the kitchen beside whose modules nobody, not even root, can keep a kernel."""
     galley_ = tmp_path / "readonly" / "galley"
-    for package in ("kitchen", "compiled"):
+    for package in ("kitchen", "compiled", "files"):
         ignored = shutil.ignore_patterns("__pycache__")
         shutil.copytree(PACKAGE / package, galley_ / package, ignore=ignored)
     for file in ("__init__.py", "errors.py"):
@@ -61,7 +61,7 @@ def test_a_cache_folder_that_cannot_be_written_gives_way_to_the_users(copied: Pa
     assert Path(origin).is_relative_to(copied)
     assert reward == "0"
     assert Path(cache).is_relative_to(user)
-    assert list(Path(cache).glob("classic.step-*.nbi"))
+    assert list(Path(cache).glob("tick.step-*.nbi"))
 
 
 @pytest.mark.parametrize("home", ["/dev/null", "no/folder"])

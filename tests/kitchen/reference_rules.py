@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from galley.kitchen import ChefView, KitchenView, Layout, PotView
+from galley.kitchen import ChefView, KitchenView, Layout
+from tests.kitchen.pots import kind_of, pot_of
 
 Place = tuple[int, int]
 AHEAD = ((0, -1), (0, 1), (1, 0), (-1, 0))
@@ -42,7 +43,7 @@ class SlowKitchen:
             layout,
             [Chef((chef.x, chef.y), chef.facing, NAMES[chef.held]) for chef in seen.chefs],
             {place: NAMES[thing] for place, thing in seen.things.items()},
-            {place: Pot([NAMES[pot.kind]] * pot.count, pot.ticks) for place, pot in seen.pots.items()},
+            {place: Pot([NAMES[kind_of(pot)]] * pot.count, pot.ticks) for place, pot in seen.pots.items()},
             seen.tick,
             None if orders is None else list(orders[seen.orders_delivered :]),
             seen.deliveries,
@@ -53,7 +54,7 @@ class SlowKitchen:
         for place, pot in self.pots.items():
             kind = NAMES.index(pot.inside[0]) if pot.inside else 0
             ready = len(pot.inside) == 3 and pot.ticks >= self.layout.rules.cook_time_ticks
-            pots[place] = PotView(kind, len(pot.inside), pot.ticks, ready)
+            pots[place] = pot_of(kind, len(pot.inside), pot.ticks, ready)
         first, second = (ChefView(*chef.at, chef.facing, NAMES.index(chef.holds)) for chef in self.chefs)
         left = 0 if self.orders_left is None else len(self.layout.rules.orders or ()) - len(self.orders_left)
         return KitchenView(

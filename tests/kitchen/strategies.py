@@ -8,7 +8,8 @@ import numpy as np
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from galley.kitchen import ChefView, KitchenView, Layout, PotView, Rules, from_view
+from galley.kitchen import ChefView, KitchenView, Layout, Rules, from_view
+from tests.kitchen.pots import pot_of
 
 INNER = " " * 6 + "XPOTDS"
 BORDER = "XXPOTDS"
@@ -61,7 +62,7 @@ def states(draw: Any, layout: Layout) -> NDArray[np.int16]:
     for place in layout.pots:
         count = draw(st.integers(0, 3))
         ticks = draw(st.integers(1, layout.rules.cook_time_ticks)) if count == 3 else 0
-        pots[place] = PotView(draw(st.sampled_from(kinds)) if count else 0, count, ticks)
+        pots[place] = pot_of(draw(st.sampled_from(kinds)) if count else 0, count, ticks)
     lying = {place: draw(st.sampled_from([0, 0, 0]) | things) for place in layout.counters}
     seen = KitchenView(
         (chefs[0], chefs[1]),

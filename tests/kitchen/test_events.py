@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from galley.kitchen import EVENTS, ChefView, Event, Kitchen, KitchenView, Layout, PotView, from_view
 from galley.kitchen.events import PLACES
 from galley.kitchen.trajectory import play
+from tests.kitchen.pots import pot_of
 from tests.kitchen.strategies import joint_actions, situations
 
 ROOM = Layout.from_ascii("room", "XPTXX\nO1 2S\nX   X\nXDXXX", cook_time_ticks=2, orders=("onion",))
@@ -20,22 +21,22 @@ AWAY = ChefView(3, 2, S)
 @pytest.mark.parametrize(
     ("chef", "action", "pot", "thing", "expected"),
     [
-        (ChefView(1, 1, W), INTERACT, PotView(), 0, ("pick_up", "onion", "dispenser", 0, 1, 0)),
-        (ChefView(2, 1, N), INTERACT, PotView(), 0, ("pick_up", "tomato", "dispenser", 2, 0, 0)),
-        (ChefView(1, 2, S), INTERACT, PotView(), 0, ("pick_up", "dish", "dispenser", 1, 3, 0)),
-        (ChefView(1, 2, W), INTERACT, PotView(), 3, ("pick_up", "dish", "counter", 0, 2, 0)),
-        (ChefView(1, 2, W), INTERACT, PotView(), 5, ("pick_up", "tomato_soup", "counter", 0, 2, 0)),
-        (ChefView(1, 1, N, 3), INTERACT, PotView(1, 3, 2), 0, ("pick_up", "onion_soup", "pot", 1, 0, 0)),
-        (ChefView(1, 1, N, 3), INTERACT, PotView(2, 3, 2), 0, ("pick_up", "tomato_soup", "pot", 1, 0, 0)),
-        (ChefView(1, 2, W, 4), INTERACT, PotView(), 0, ("put_down", "onion_soup", "counter", 0, 2, 0)),
-        (ChefView(1, 1, N, 2), INTERACT, PotView(2, 1), 0, ("potting", "tomato", "pot", 1, 0, 0)),
-        (ChefView(3, 1, E, 4), INTERACT, PotView(), 0, ("delivery", "onion_soup", "serving", 4, 1, 20)),
-        (ChefView(3, 1, E, 5), INTERACT, PotView(), 0, ("delivery", "tomato_soup", "serving", 4, 1, 0)),
-        (ChefView(1, 1, E), N, PotView(), 0, ("blocked", "", "pot", 1, 0, 0)),
-        (ChefView(1, 1, E), W, PotView(), 0, ("blocked", "", "dispenser", 0, 1, 0)),
-        (ChefView(3, 1, E), N, PotView(), 0, ("blocked", "", "counter", 3, 0, 0)),
-        (ChefView(3, 1, N), E, PotView(), 0, ("blocked", "", "serving", 4, 1, 0)),
-        (ChefView(2, 2, N), E, PotView(), 0, ("blocked", "", "floor", 3, 2, 0)),
+        (ChefView(1, 1, W), INTERACT, pot_of(), 0, ("pick_up", "onion", "dispenser", 0, 1, 0)),
+        (ChefView(2, 1, N), INTERACT, pot_of(), 0, ("pick_up", "tomato", "dispenser", 2, 0, 0)),
+        (ChefView(1, 2, S), INTERACT, pot_of(), 0, ("pick_up", "dish", "dispenser", 1, 3, 0)),
+        (ChefView(1, 2, W), INTERACT, pot_of(), 3, ("pick_up", "dish", "counter", 0, 2, 0)),
+        (ChefView(1, 2, W), INTERACT, pot_of(), 5, ("pick_up", "tomato_soup", "counter", 0, 2, 0)),
+        (ChefView(1, 1, N, 3), INTERACT, pot_of(1, 3, 2), 0, ("pick_up", "onion_soup", "pot", 1, 0, 0)),
+        (ChefView(1, 1, N, 3), INTERACT, pot_of(2, 3, 2), 0, ("pick_up", "tomato_soup", "pot", 1, 0, 0)),
+        (ChefView(1, 2, W, 4), INTERACT, pot_of(), 0, ("put_down", "onion_soup", "counter", 0, 2, 0)),
+        (ChefView(1, 1, N, 2), INTERACT, pot_of(2, 1), 0, ("potting", "tomato", "pot", 1, 0, 0)),
+        (ChefView(3, 1, E, 4), INTERACT, pot_of(), 0, ("delivery", "onion_soup", "serving", 4, 1, 20)),
+        (ChefView(3, 1, E, 5), INTERACT, pot_of(), 0, ("delivery", "tomato_soup", "serving", 4, 1, 0)),
+        (ChefView(1, 1, E), N, pot_of(), 0, ("blocked", "", "pot", 1, 0, 0)),
+        (ChefView(1, 1, E), W, pot_of(), 0, ("blocked", "", "dispenser", 0, 1, 0)),
+        (ChefView(3, 1, E), N, pot_of(), 0, ("blocked", "", "counter", 3, 0, 0)),
+        (ChefView(3, 1, N), E, pot_of(), 0, ("blocked", "", "serving", 4, 1, 0)),
+        (ChefView(2, 2, N), E, pot_of(), 0, ("blocked", "", "floor", 3, 2, 0)),
     ],
 )
 def test_each_event(chef: ChefView, action: int, pot: PotView, thing: int, expected: tuple) -> None:
@@ -53,7 +54,7 @@ def test_each_event(chef: ChefView, action: int, pot: PotView, thing: int, expec
 def test_soup_ready_has_no_seat(kind: int, soup: str) -> None:
     kitchen = Kitchen(ROOM)
     chefs = (ChefView(1, 1, S), AWAY)
-    kitchen.state[:] = from_view(ROOM, KitchenView(chefs, {}, {(1, 0): PotView(kind, 3, 1)}))
+    kitchen.state[:] = from_view(ROOM, KitchenView(chefs, {}, {(1, 0): pot_of(kind, 3, 1)}))
     kitchen.step(STAY, STAY)
     assert kitchen.events == (Event(0, None, "soup_ready", soup, "pot", 1, 0),)
     kitchen.step(STAY, STAY)

@@ -11,8 +11,9 @@ from hypothesis import given
 from numpy.typing import NDArray
 
 from galley.errors import GalleyError
-from galley.kitchen import ENCODINGS, ChefView, Encoder, KitchenView, Layout, PotView, from_view, view
+from galley.kitchen import ENCODINGS, ChefView, Encoder, KitchenView, Layout, from_view, view
 from tests.kitchen import reference_2019
+from tests.kitchen.pots import kind_of, pot_of
 from tests.kitchen.strategies import situations
 from tests.overcooked_package import mdp
 
@@ -42,7 +43,9 @@ def as_package_state(package: Any, layout: Layout, seen: KitchenView) -> Any:
 
     objects = {place: thing(place, code) for place, code in seen.things.items()}
     objects |= {
-        place: soup(place, pot.kind, pot.count, pot.ticks) for place, pot in seen.pots.items() if pot.count
+        place: soup(place, kind_of(pot), pot.count, pot.ticks)
+        for place, pot in seen.pots.items()
+        if pot.count
     }
     players = []
     for chef in seen.chefs:
@@ -87,7 +90,7 @@ def test_2019_features_equal_their_description(situation: tuple[Layout, NDArray[
 
 def test_grid_by_hand() -> None:
     things = {(0, 2): DISH, (4, 2): ONION_SOUP}
-    pots = {(2, 0): PotView(ONION, 2), (3, 0): PotView(ONION, 3, 5)}
+    pots = {(2, 0): pot_of(ONION, 2), (3, 0): pot_of(ONION, 3, 5)}
     seen = KitchenView((ChefView(1, 1, W, ONION), ChefView(3, 2, S)), things, pots, tick=361)
     shown = Encoder(ROOM, "grid").seat(from_view(ROOM, seen)[None], 1)[0]
     marked = {(int(c), int(x), int(y)): int(shown[c, y, x]) for c, y, x in np.argwhere(shown)}
@@ -119,7 +122,7 @@ def test_grid_by_hand() -> None:
 
 def test_2019_grid_loses_what_is_not_held_while_one_is_held() -> None:
     things = {(0, 2): DISH, (4, 2): ONION, (0, 0): ONION_SOUP}
-    pots = {(2, 0): PotView(ONION, 2), (3, 0): PotView(ONION, 3, 5)}
+    pots = {(2, 0): pot_of(ONION, 2), (3, 0): pot_of(ONION, 3, 5)}
 
     def channels(held: int) -> dict[int, int]:
         seen = KitchenView((ChefView(1, 1, W, held), ChefView(3, 2, S)), things, pots)
@@ -141,7 +144,7 @@ def test_2019_grid_loses_what_is_not_held_while_one_is_held() -> None:
 
 
 def test_2019_features_by_hand() -> None:
-    pots = {(2, 0): PotView(ONION, 3, 20, True), (3, 0): PotView(ONION, 3, 5)}
+    pots = {(2, 0): pot_of(ONION, 3, 20, True), (3, 0): pot_of(ONION, 3, 5)}
     seen = KitchenView((ChefView(1, 1, W, ONION), ChefView(3, 2, S, DISH)), {}, pots)
     numbers = Encoder(ROOM, "overcooked-2019-features").seat(from_view(ROOM, seen)[None], 1)[0].tolist()
     own = [0, 1, 0, 0, 0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0, -2, -1, -2, 0, 0, 0, 0, 1, -1, 0, 1, 1, 0]

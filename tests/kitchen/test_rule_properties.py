@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
+import sys
 from types import ModuleType
 
 import numba
@@ -12,9 +13,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from galley.kitchen import Kitchen, KitchenBatch, Layout, from_view, observation_kernels, view
+from galley.kitchen import Kitchen, KitchenBatch, Layout, from_view, observation_kernels, pots, view
+from galley.kitchen.codes import OUT_SIZE, TICK
 from galley.kitchen.observations import ENCODINGS, Encoder
-from galley.kitchen.rules import classic as rules
+from galley.kitchen.rules import classic, shared
+from galley.kitchen.rules import tick as rules
 from galley.kitchen.state import state_problem
 from galley.kitchen.trajectory import play
 from tests.kitchen.reference_rules import SlowKitchen
@@ -67,41 +70,40 @@ def test_a_finished_kitchen_does_not_change(
     situation: tuple[Layout, NDArray[np.int16]], actions: NDArray[np.uint8]
 ) -> None:
     layout, state = situation
-    state[6] = layout.rules.horizon_ticks
+    state[TICK] = layout.rules.horizon_ticks
     episode = play(layout, actions, state)
     assert (episode.states == state).all()
     assert not episode.out.any()
 
 
-def plain(module: ModuleType) -> ModuleType:
-    """The kernel file as plain Python."""
-    spec = importlib.util.spec_from_file_location(
-        f"plain_{module.__name__.split('.')[-1]}", str(module.__file__)
-    )
-    assert spec is not None
-    assert spec.loader is not None
-    copy = importlib.util.module_from_spec(spec)
+def plain(*modules: ModuleType) -> ModuleType:
+    """The last of some modules of kernels as plain Python that calls the others as plain Python."""
     before = numba.config.DISABLE_JIT
     numba.config.DISABLE_JIT = True
+    kept = {module.__name__: sys.modules.pop(module.__name__) for module in modules}
     try:
-        spec.loader.exec_module(copy)
+        return [importlib.import_module(name) for name in kept][-1]
     finally:
         numba.config.DISABLE_JIT = before
-    return copy
+        for name, module in kept.items():
+            sys.modules[name] = module
+            package, _, short = name.rpartition(".")
+            setattr(sys.modules[package], short, module)
 
 
 @pytest.fixture(scope="module")
 def plain_rules() -> ModuleType:
-    return plain(rules)
+    return plain(pots, shared, classic, rules)
 
 
 @pytest.fixture(scope="module")
 def plain_kernels() -> ModuleType:
-    return plain(observation_kernels)
+    return plain(pots, shared, observation_kernels)
 
 
 def test_plain_kernels_are_not_compiled(plain_rules: ModuleType) -> None:
     assert not hasattr(plain_rules.step, "py_func")
+    assert not hasattr(plain_rules.classic_step, "py_func")
 
 
 @given(situation=situations(), actions=joint_actions(12))
@@ -110,7 +112,7 @@ def test_compiled_rules_equal_plain_python(
 ) -> None:
     layout, state = situation
     episode = play(layout, actions, state)
-    slow, out = state.copy(), np.zeros(4, dtype=np.int32)
+    slow, out = state.copy(), np.zeros(OUT_SIZE, dtype=np.int32)
     for tick, (a0, a1) in enumerate(actions.tolist()):
         reward = plain_rules.step(layout.spec, slow, a0, a1, out)
         assert reward == episode.out[tick, 0]

@@ -21,6 +21,7 @@ from galley.kitchen import (
     PotView,
     from_view,
 )
+from tests.kitchen.pots import pot_of
 
 ROOM = Layout.from_ascii(
     "room",
@@ -53,7 +54,7 @@ def test_chefs_start_facing_north_with_empty_hands() -> None:
     start = Kitchen(ROOM).view
     assert start.chefs == (ChefView(1, 1, NORTH, 0), ChefView(3, 1, NORTH, 0))
     assert (start.tick, start.score, dict(start.things)) == (0, 0, {})
-    assert start.pots == {POT: PotView()}
+    assert start.pots == {POT: pot_of()}
 
 
 @pytest.mark.parametrize(
@@ -133,25 +134,25 @@ def test_a_full_counter_takes_nothing() -> None:
 
 @pytest.mark.parametrize("kind", [ONION, TOMATO])
 def test_three_of_a_kind_cook_by_themselves_and_the_filling_tick_counts(kind: int) -> None:
-    made = kitchen(ChefView(1, 1, NORTH, kind), away(), pots={POT: PotView(kind, 2)})
+    made = kitchen(ChefView(1, 1, NORTH, kind), away(), pots={POT: pot_of(kind, 2)})
     made.step(INTERACT, STAY)
-    assert made.view.pots[POT] == PotView(kind, 3, 1)
+    assert made.view.pots[POT] == pot_of(kind, 3, 1)
     made.step(STAY, STAY)
-    assert made.view.pots[POT] == PotView(kind, 3, 2)
+    assert made.view.pots[POT] == pot_of(kind, 3, 2)
     made.step(STAY, STAY)
-    assert made.view.pots[POT] == PotView(kind, 3, 3, ready=True)
+    assert made.view.pots[POT] == pot_of(kind, 3, 3, ready=True)
     made.step(STAY, STAY)
-    assert made.view.pots[POT] == PotView(kind, 3, 3, ready=True)
+    assert made.view.pots[POT] == pot_of(kind, 3, 3, ready=True)
 
 
 def test_two_in_a_pot_do_not_cook() -> None:
-    made = kitchen(ChefView(1, 1, NORTH, ONION), away(), pots={POT: PotView(ONION, 1)})
+    made = kitchen(ChefView(1, 1, NORTH, ONION), away(), pots={POT: pot_of(ONION, 1)})
     made.step(INTERACT, STAY)
     made.step(STAY, STAY)
-    assert made.view.pots[POT] == PotView(ONION, 2, 0)
+    assert made.view.pots[POT] == pot_of(ONION, 2, 0)
 
 
-@pytest.mark.parametrize("pot", [PotView(ONION, 1), PotView(ONION, 3, 2), PotView(TOMATO, 3, 3)])
+@pytest.mark.parametrize("pot", [pot_of(ONION, 1), pot_of(ONION, 3, 2), pot_of(TOMATO, 3, 3)])
 def test_a_pot_takes_neither_another_kind_nor_a_fourth(pot: PotView) -> None:
     made = kitchen(ChefView(1, 1, NORTH, TOMATO), away(), pots={POT: pot})
     made.step(INTERACT, STAY)
@@ -161,13 +162,13 @@ def test_a_pot_takes_neither_another_kind_nor_a_fourth(pot: PotView) -> None:
 
 @pytest.mark.parametrize(("kind", "soup"), [(ONION, ONION_SOUP), (TOMATO, TOMATO_SOUP)])
 def test_a_dish_takes_a_ready_soup(kind: int, soup: int) -> None:
-    made = kitchen(ChefView(1, 1, NORTH, DISH), away(), pots={POT: PotView(kind, 3, 3)})
+    made = kitchen(ChefView(1, 1, NORTH, DISH), away(), pots={POT: pot_of(kind, 3, 3)})
     made.step(INTERACT, STAY)
     assert made.view.chefs[0].held == soup
-    assert made.view.pots[POT] == PotView()
+    assert made.view.pots[POT] == pot_of()
 
 
-@pytest.mark.parametrize("pot", [PotView(), PotView(ONION, 2), PotView(ONION, 3, 2)])
+@pytest.mark.parametrize("pot", [pot_of(), pot_of(ONION, 2), pot_of(ONION, 3, 2)])
 def test_a_dish_takes_nothing_that_is_not_ready(pot: PotView) -> None:
     made = kitchen(ChefView(1, 1, NORTH, DISH), away(), pots={POT: pot})
     made.step(INTERACT, STAY)
@@ -176,7 +177,7 @@ def test_a_dish_takes_nothing_that_is_not_ready(pot: PotView) -> None:
 
 @pytest.mark.parametrize("held", [0, ONION, TOMATO_SOUP])
 def test_only_a_dish_takes_a_soup_from_a_pot(held: int) -> None:
-    made = kitchen(ChefView(1, 1, NORTH, held), away(), pots={POT: PotView(ONION, 3, 3)})
+    made = kitchen(ChefView(1, 1, NORTH, held), away(), pots={POT: pot_of(ONION, 3, 3)})
     made.step(INTERACT, STAY)
     assert made.view.chefs[0].held == held
 
@@ -281,14 +282,14 @@ def test_a_batch_resets_the_kitchens_of_a_mask() -> None:
     ("chef", "pots", "things", "other", "expected"),
     [
         (ChefView(1, 1, NORTH, ONION), {}, {}, away(), 3),
-        (ChefView(1, 1, NORTH, DISH), {POT: PotView(ONION, 3, 3)}, {}, away(), 5),
-        (ChefView(1, 2, SOUTH), {POT: PotView(ONION, 1)}, {}, away(), 3),
-        (ChefView(1, 2, SOUTH), {POT: PotView(ONION, 3, 2)}, {}, away(), 3),
+        (ChefView(1, 1, NORTH, DISH), {POT: pot_of(ONION, 3, 3)}, {}, away(), 5),
+        (ChefView(1, 2, SOUTH), {POT: pot_of(ONION, 1)}, {}, away(), 3),
+        (ChefView(1, 2, SOUTH), {POT: pot_of(ONION, 3, 2)}, {}, away(), 3),
         (ChefView(1, 2, SOUTH), {}, {}, away(), 0),
-        (ChefView(1, 2, SOUTH), {POT: PotView(ONION, 1)}, {(0, 2): DISH}, away(), 0),
-        (ChefView(1, 2, SOUTH), {POT: PotView(ONION, 1)}, {(0, 2): ONION}, away(), 3),
-        (ChefView(1, 2, SOUTH), {POT: PotView(ONION, 1)}, {}, ChefView(3, 2, SOUTH, DISH), 0),
-        (ChefView(1, 1, WEST), {POT: PotView(ONION, 1)}, {}, away(), 0),
+        (ChefView(1, 2, SOUTH), {POT: pot_of(ONION, 1)}, {(0, 2): DISH}, away(), 0),
+        (ChefView(1, 2, SOUTH), {POT: pot_of(ONION, 1)}, {(0, 2): ONION}, away(), 3),
+        (ChefView(1, 2, SOUTH), {POT: pot_of(ONION, 1)}, {}, ChefView(3, 2, SOUTH, DISH), 0),
+        (ChefView(1, 1, WEST), {POT: pot_of(ONION, 1)}, {}, away(), 0),
     ],
 )
 def test_shaping_rewards_steps_towards_a_soup(chef, pots, things, other, expected: float) -> None:
@@ -302,6 +303,6 @@ def test_a_pot_emptied_in_this_tick_still_makes_a_dish_useful() -> None:
     """As in the 2019 code, which looks at the pots once, before anyone interacts."""
     batch = KitchenBatch(ROOM, 1)
     chefs = (ChefView(1, 1, NORTH, DISH), ChefView(1, 2, SOUTH))
-    batch.states[0] = from_view(ROOM, KitchenView(chefs, {}, {POT: PotView(ONION, 3, 3)}))
+    batch.states[0] = from_view(ROOM, KitchenView(chefs, {}, {POT: pot_of(ONION, 3, 3)}))
     batch.step(np.array([[INTERACT, INTERACT]]))
     assert batch.shaping().tolist() == [[5, 3]]

@@ -58,6 +58,10 @@ def test_files(tmp_path: Path) -> None:
     np.testing.assert_array_equal(replay(again), replay(EPISODE))
     np.testing.assert_array_equal(replay(again)[0], start(ROOM))
     header = json.loads(path.read_text().splitlines()[0])
+    assert header["layout"]["rules"].pop("rule_set") == "classic"
+    assert (
+        from_text("\n".join([json.dumps(header), *to_text(EPISODE).splitlines()[1:]]), "old").layout == ROOM
+    )
     assert (header["format"], header["ticks"], header["layout"]["grid"]) == (1, 3, list(ROOM.grid))
 
 

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from galley.kitchen import Layout
-from galley.planning.joint_motion import JointMotion, Pose
 from tests.overcooked_package import mdp
+from tests.planning.joint_motion import JointMotion, Pose
 
 FACINGS = {(0, -1): 0, (0, 1): 1, (1, 0): 2, (-1, 0): 3}
 

@@ -7,7 +7,7 @@ import pytest
 
 from galley.errors import GalleyError
 from galley.kitchen import Kitchen, Layout
-from galley.planning.joint_motion import Goal, JointMotion, Pose
+from tests.planning.joint_motion import Goal, JointMotion, Pose
 from tests.planning.kitchens import FAR, Enumeration, random_kitchen
 
 RING = Layout.from_ascii(

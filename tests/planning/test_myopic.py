@@ -25,6 +25,7 @@ from galley.kitchen import (
 from galley.planning.distances import distances
 from galley.planning.kernels.myopic_kernel import NOWHERE, target
 from galley.planning.myopic import Myopic
+from tests.kitchen.pots import pot_of
 from tests.planning.layouts import FORCED, MIXED, ROOM, layouts
 
 ONION, TOMATO, DISH, ONION_SOUP, TOMATO_SOUP = 1, 2, 3, 4, 5
@@ -39,7 +40,7 @@ def state(
 ) -> NDArray[np.int16]:
     """A state with the chefs where they start, facing north."""
     first, second = (ChefView(*start, 0, thing) for start, thing in zip(layout.starts, held, strict=True))
-    filled = {place: PotView() for place in layout.pots} | (pots or {})
+    filled = {place: pot_of() for place in layout.pots} | (pots or {})
     return from_view(layout, KitchenView((first, second), things or {}, filled, orders_delivered=delivered))
 
 
@@ -50,24 +51,24 @@ def goal(layout: Layout, now: NDArray[np.int16], seat: int = 0) -> tuple[int, in
     return None if cell == NOWHERE else layout.place(cell)
 
 
-COOKS = PotView(ONION, 3, 5)
+COOKS = pot_of(ONION, 3, 5)
 POT = (2, 0)
 
 
 @pytest.mark.parametrize(
     ("held", "pot", "things", "where"),
     [
-        ((0, 0), PotView(), {}, (0, 1)),  # an onion is missing: the near dispenser
-        ((0, 0), PotView(), {(0, 2): ONION}, (0, 2)),  # one lies nearer
+        ((0, 0), pot_of(), {}, (0, 1)),  # an onion is missing: the near dispenser
+        ((0, 0), pot_of(), {(0, 2): ONION}, (0, 2)),  # one lies nearer
         ((0, 0), COOKS, {}, (1, 3)),  # a soup cooks: a dish
         ((0, DISH), COOKS, {}, None),  # the other has one already
         ((0, 0), COOKS, {(0, 2): ONION_SOUP}, (0, 2)),  # a soup lies about
-        ((ONION, 0), PotView(ONION, 2), {}, POT),
+        ((ONION, 0), pot_of(ONION, 2), {}, POT),
         ((ONION, 0), COOKS, {}, (1, 0)),  # no pot takes it: on the nearest counter
-        ((TOMATO, 0), PotView(ONION, 1), {}, (1, 0)),
+        ((TOMATO, 0), pot_of(ONION, 1), {}, (1, 0)),
         ((DISH, 0), COOKS, {}, POT),
-        ((DISH, 0), PotView(ONION, 2), {(1, 0): DISH}, (0, 2)),
-        ((ONION_SOUP, 0), PotView(), {}, (3, 3)),
+        ((DISH, 0), pot_of(ONION, 2), {(1, 0): DISH}, (0, 2)),
+        ((ONION_SOUP, 0), pot_of(), {}, (3, 3)),
     ],
 )
 def test_subtasks(
@@ -80,9 +81,9 @@ def test_orders_decide_what_is_cooked_and_served() -> None:
     layout = MIXED.with_rules(orders=("tomato", "onion"))
     onions, tomatoes = (0, 1), (7, 1)
     assert goal(layout, state(layout)) == tomatoes
-    first = {(2, 0): PotView(TOMATO, 1)}
+    first = {(2, 0): pot_of(TOMATO, 1)}
     assert goal(layout, state(layout, pots=first)) in (onions, tomatoes)  # one to fill up, one to begin
-    cooking = {(2, 0): PotView(TOMATO, 3, 3)}
+    cooking = {(2, 0): pot_of(TOMATO, 3, 3)}
     assert goal(layout, state(layout, (0, DISH), cooking)) == onions
     assert goal(layout, state(layout, (ONION, 0), cooking)) == (5, 0)
     assert goal(layout, state(layout, (TOMATO, 0), cooking)) not in layout.pots
@@ -94,7 +95,7 @@ def test_orders_decide_what_is_cooked_and_served() -> None:
 
 
 def test_without_orders_a_started_pot_is_filled_with_its_kind() -> None:
-    pots = {(2, 0): PotView(TOMATO, 2), (5, 0): PotView(ONION, 3, 20)}
+    pots = {(2, 0): pot_of(TOMATO, 2), (5, 0): pot_of(ONION, 3, 20)}
     assert goal(MIXED, state(MIXED, (0, DISH), pots)) == (7, 1)
 
 
@@ -104,7 +105,7 @@ def test_things_are_passed_where_chefs_stand_apart() -> None:
     assert goal(FORCED, state(FORCED), left) in FORCED.onions
     assert goal(FORCED, state(FORCED, (0, ONION)), left) in shared
     assert goal(FORCED, state(FORCED, things={(2, 3): ONION}), 0) == (2, 3)
-    full = {place: PotView(ONION, 3, 20) for place in FORCED.pots}
+    full = {place: pot_of(ONION, 3, 20) for place in FORCED.pots}
     assert goal(FORCED, state(FORCED, pots=full), left) == (0, 3)
     assert goal(FORCED, state(FORCED, (0, DISH), full), left) in shared
     enough = {(2, 1): DISH, (2, 2): DISH}
@@ -114,7 +115,7 @@ def test_things_are_passed_where_chefs_stand_apart() -> None:
 
 
 def test_the_receiver_makes_room_on_full_shared_counters() -> None:
-    full = {place: PotView(ONION, 3, 20) for place in FORCED.pots}
+    full = {place: pot_of(ONION, 3, 20) for place in FORCED.pots}
     things = {(2, 1): ONION, (2, 2): ONION, (2, 3): ONION}
     assert goal(FORCED, state(FORCED, pots=full, things=things), 0) in things
     assert goal(FORCED, state(FORCED, (ONION, 0), full, {(2, 2): ONION, (2, 3): ONION}), 0) not in things
@@ -129,13 +130,13 @@ def acting(layout: Layout, now: NDArray[np.int16], seat: int = 0) -> tuple[Myopi
 def test_it_waits_beside_a_cooking_pot_and_takes_the_soup_when_ready() -> None:
     chefs = (ChefView(2, 1, NORTH, DISH), ChefView(3, 2, NORTH))
     for ticks, action in ((19, STAY), (20, INTERACT)):
-        now = from_view(ROOM, KitchenView(chefs, {}, {POT: PotView(ONION, 3, ticks)}))
+        now = from_view(ROOM, KitchenView(chefs, {}, {POT: pot_of(ONION, 3, ticks)}))
         assert acting(ROOM, now)[1] == action
 
 
 def test_a_blocked_chef_moves_at_random_to_a_free_cell() -> None:
     chefs = (ChefView(2, 1, WEST), ChefView(1, 1, NORTH))  # the way to the onions leads through the other
-    now = from_view(ROOM, KitchenView(chefs, {}, {POT: PotView()}))
+    now = from_view(ROOM, KitchenView(chefs, {}, {POT: pot_of()}))
     moves = set()
     for seed in range(30):
         agent = Myopic()

@@ -13,9 +13,11 @@ from galley.planning.brain import brain
 from galley.planning.distances import distances
 from galley.planning.myopic import Myopic
 from galley.planning.robots import MDP, QMDP
-from galley.planning.subtasks import SUBTASKS, feasible_subtasks, myopic_subtask
+from galley.planning.subtasks import SUBTASKS
 from galley.planning.trials import run
+from tests.kitchen.pots import pot_of
 from tests.planning.kitchens import random_kitchen
+from tests.planning.subtasks import feasible_subtasks, myopic_subtask
 
 ROOM = Layout.from_ascii(
     "room",
@@ -84,7 +86,7 @@ def test_the_belief_goes_where_the_human_goes() -> None:
         layout,
         KitchenView(
             chefs=(ChefView(4, 3, NORTH), ChefView(3, 1, NORTH)),
-            pots={(4, 0): PotView(kind=1, count=3, ticks=5)},
+            pots={(4, 0): pot_of(kind=1, count=3, ticks=5)},
         ),
     )
     assert "take dish" in feasible_subtasks(distances(layout), state, 1)
@@ -98,7 +100,7 @@ def test_the_belief_goes_where_the_human_goes() -> None:
         two,
         KitchenView(
             chefs=(ChefView(4, 3, NORTH), ChefView(3, 2, NORTH)),
-            pots={(1, 0): PotView(), (4, 0): PotView(kind=1, count=3, ticks=5)},
+            pots={(1, 0): pot_of(), (4, 0): pot_of(kind=1, count=3, ticks=5)},
         ),
     )
     robot.reset(two, 0, 0)
@@ -114,7 +116,7 @@ def test_the_belief_is_uniform_again_when_the_human_has_done_a_subtask() -> None
         two,
         KitchenView(
             chefs=(ChefView(4, 3, NORTH), ChefView(1, 1, 3)),
-            pots={(1, 0): PotView(), (4, 0): PotView(kind=1, count=3, ticks=5)},
+            pots={(1, 0): pot_of(), (4, 0): pot_of(kind=1, count=3, ticks=5)},
         ),
     )
     robot = QMDP()
@@ -132,7 +134,7 @@ def test_subtasks_follow_the_state_machine() -> None:
         seen = KitchenView(chefs=(ChefView(3, 2, 0, held), ChefView(1, 2, 0)), pots={(2, 0): pot})
         return set(feasible_subtasks(known, from_view(ROOM, seen), 0))
 
-    cooking, begun = PotView(kind=1, count=3, ticks=2), PotView(kind=1, count=1)
+    cooking, begun = pot_of(kind=1, count=3, ticks=2), pot_of(kind=1, count=1)
     assert at(0, begun) == {"take onion"}
     assert at(0, cooking) == {"take dish"}
     assert at(1, begun) == {"fill pot"}

@@ -18,10 +18,20 @@ from numpy.typing import NDArray
 
 from galley.datasets.pickled_frames import read_frame
 from galley.errors import GalleyError
-from galley.kitchen.codes import CELLS, INGREDIENTS_PER_SOUP, INTERACT, OUT_REWARD, POT, STAY, THINGS, TICK
+from galley.kitchen.codes import (
+    CELLS,
+    INGREDIENTS_PER_SOUP,
+    INTERACT,
+    OUT_REWARD,
+    OUT_SIZE,
+    POT,
+    STAY,
+    THINGS,
+    TICK,
+)
 from galley.kitchen.layout import Layout, Rules
 from galley.kitchen.reach import STEPS
-from galley.kitchen.rules import classic as rules
+from galley.kitchen.rules.tick import step_batch
 from galley.kitchen.state import ChefView, KitchenView, PotView, from_view, state_problem
 from galley.kitchen.trajectory import play
 
@@ -95,8 +105,8 @@ def matches(game: HumanGame) -> NDArray[np.bool_]:
     """bool[T]: for which ticks state and joint action lead to the recorded next state and reward."""
     states = game.states.copy()
     states[:, TICK] = 0
-    out = np.zeros((len(states), 4), dtype=np.int32)
-    rules.step_batch(game.layout.spec, states, game.joint_actions, out)
+    out = np.zeros((len(states), OUT_SIZE), dtype=np.int32)
+    step_batch(game.layout.spec, states, game.joint_actions, out)
     right = (_compared(states) == _compared(game.next_states)).all(axis=1)
     agrees: NDArray[np.bool_] = right & (out[:, OUT_REWARD] == game.rewards)
     return agrees
@@ -190,7 +200,8 @@ def _state(layout: Layout, text: str, seen: dict[str, NDArray[np.int16]]) -> NDA
             if layout.tiles[y, x] == POT:
                 kind, count, ticks = record["state"]
                 capped = min(ticks, layout.rules.cook_time_ticks)
-                pots[x, y] = PotView(THINGS.index(kind), count, capped)
+                onions = count if kind == "onion" else 0
+                pots[x, y] = PotView(onions, count - onions, capped)
             else:
                 things[x, y] = _thing(layout, record)
         state = from_view(layout, KitchenView((first, second), things, pots))

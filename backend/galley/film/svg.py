@@ -115,7 +115,7 @@ class Drawings:
         size = SIZES["pot"][0]
         left, top = -size / 2, -0.42
         parts.append(self.sprite("pot", left, top, size, size))
-        name = "tomato" if pot.kind == 2 else "onion"
+        name = "tomato" if pot.tomatoes > pot.onions else "onion"
         if cooking or pot.ready:
             parts.append(self.sprite(f"broth-{name}", left, top, size, size))
         if pot.ready:
@@ -240,6 +240,6 @@ def _ring(done: float, ready: bool) -> str:
 
 
 def _pip(number: int, pot: PotView, y: float) -> str:
-    full = "#e0402c" if pot.kind == 2 else "#f0a83c"
-    look = f'fill="{full if number < pot.count else "#f4f6f8"}" stroke="#3b2418" stroke-width="0.022"'
+    inside = ["#f0a83c"] * pot.onions + ["#e0402c"] * pot.tomatoes + ["#f4f6f8"] * _INGREDIENTS
+    look = f'fill="{inside[number]}" stroke="#3b2418" stroke-width="0.022"'
     return f'<circle cx="{(number - 1) * 0.135}" cy="{y:.4f}" r="0.048" {look}/>'

@@ -6,18 +6,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from galley.kitchen.codes import (
+    ACTIONS,
     BIT_FETCH,
     BIT_POT,
     BIT_USEFUL_DISH,
-    DELIVERIES,
     ORDERS_DELIVERED,
     OUT_EVENTS,
     OUT_REWARD,
+    OUT_SIZE,
     TICK,
 )
 from galley.kitchen.layout import Layout
-from galley.kitchen.rules import classic as rules
-from galley.kitchen.state import state_size
+from galley.kitchen.rules.shared import reset
+from galley.kitchen.rules.tick import step_batch
+from galley.kitchen.state import score_of, state_size
 
 SHAPING_POTTING = 3.0
 SHAPING_USEFUL_DISH = 3.0
@@ -25,19 +27,19 @@ SHAPING_SOUP_PICK_UP = 5.0
 
 
 class KitchenBatch:
-    """B kitchens: `states` int16[B,S] and, of the last tick, `out` int32[B,4]."""
+    """B kitchens: `states` int16[B,S] and, of the last tick, `out` int32[B,OUT_SIZE]."""
 
     def __init__(self, layout: Layout, size: int) -> None:
         self.layout = layout
         self.size = size
         self.states: NDArray[np.int16] = np.zeros((size, state_size(layout)), dtype=np.int16)
-        self.out: NDArray[np.int32] = np.zeros((size, 4), dtype=np.int32)
+        self.out: NDArray[np.int32] = np.zeros((size, OUT_SIZE), dtype=np.int32)
         self._start = np.zeros(state_size(layout), dtype=np.int16)
-        rules.reset(layout.spec, self._start)
+        reset(layout.spec, self._start)
         self.reset()
 
     def reset(self, mask: NDArray[np.bool_] | None = None) -> None:
-        """Nothing; sets the kitchens where `mask` bool[B] is true (default: all) back to their start."""
+        """Set the kitchens where `mask` bool[B] is true (default: all) back to their start."""
         if mask is None:
             self.states[:] = self._start
         else:
@@ -51,10 +53,10 @@ class KitchenBatch:
         """
         if actions.shape != (self.size, 2):
             raise ValueError(f"actions must have shape ({self.size}, 2), not {actions.shape}")
-        if self.size and (actions.max() > 5 or actions.min() < 0):
-            raise ValueError("actions must be codes from 0 to 5")
+        if self.size and (actions.max() >= len(ACTIONS) or actions.min() < 0):
+            raise ValueError(f"actions must be codes from 0 to {len(ACTIONS) - 1}")
         packed = np.ascontiguousarray(actions, dtype=np.uint8)
-        rules.step_batch(self.layout.spec, self.states, packed, self.out)
+        step_batch(self.layout.spec, self.states, packed, self.out)
         return self.out[:, OUT_REWARD]
 
     @property
@@ -73,7 +75,7 @@ class KitchenBatch:
     @property
     def scores(self) -> NDArray[np.int32]:
         """int32[B]: reward summed since the start of each."""
-        return self.states[:, DELIVERIES].astype(np.int32) * self.layout.rules.delivery_reward
+        return score_of(self.layout, self.states)
 
     def shaping(self) -> NDArray[np.float32]:
         """float32[B,2]: the extra reward of each seat in the last tick, for learning.

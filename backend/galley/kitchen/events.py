@@ -23,16 +23,19 @@ from galley.kitchen.codes import (
     COUNTER,
     FACING,
     FLOOR,
+    ONION,
+    ONION_SOUP,
     OUT_EVENTS,
     OUT_READY,
     POT,
-    POT_COUNT,
     SERVING,
-    SOUP_OF_KIND,
+    SPEC_PRICES,
     THINGS,
     TICK,
 )
 from galley.kitchen.layout import Layout
+from galley.kitchen.pots import recipe_in, recipe_of_thing, thing_of
+from galley.kitchen.reach import STEPS
 
 EVENTS: Final[dict[str, str]] = {
     "pick_up": "A chef takes a thing from a dispenser, a counter or (a finished soup, with a dish) a pot.",
@@ -50,12 +53,12 @@ _PLACE_OF_TILE: Final = {FLOOR: "floor", COUNTER: "counter", POT: "pot", SERVING
 
 # First bit, number of bits, code of the first bit's thing, kind, place.
 _GROUPS: Final = (
-    (BIT_TAKE, 3, 1, "pick_up", "dispenser"),
-    (BIT_PICK_UP, 5, 1, "pick_up", "counter"),
-    (BIT_FETCH, 2, 4, "pick_up", "pot"),
-    (BIT_PUT_DOWN, 5, 1, "put_down", "counter"),
-    (BIT_POT, 2, 1, "potting", "pot"),
-    (BIT_DELIVER, 2, 4, "delivery", "serving"),
+    (BIT_TAKE, 3, ONION, "pick_up", "dispenser"),
+    (BIT_PICK_UP, 5, ONION, "pick_up", "counter"),
+    (BIT_FETCH, 2, ONION_SOUP, "pick_up", "pot"),
+    (BIT_PUT_DOWN, 5, ONION, "put_down", "counter"),
+    (BIT_POT, 2, ONION, "potting", "pot"),
+    (BIT_DELIVER, 2, ONION_SOUP, "delivery", "serving"),
 )
 
 
@@ -78,7 +81,7 @@ def decode(
 ) -> tuple[Event, ...]:
     """The events of one tick: seat 0's, seat 1's, then the pots'.
 
-    `before` and `after` are the states int16[S] around the tick, `out` int32[4] is what the tick wrote.
+    `before` and `after` are the states int16[S] around the tick, `out` int32[OUT_SIZE] what it wrote.
     """
     written = out.tolist()
     if not any(written[OUT_EVENTS:]):
@@ -91,21 +94,21 @@ def decode(
             continue
         facing = int(after[CHEF * seat + FACING])
         x, y = layout.place(int(before[CHEF * seat + CELL]))
-        x += (facing == 2) - (facing == 3)
-        y += (facing == 1) - (facing == 0)
+        dx, dy = STEPS[facing]
+        x, y = x + dx, y + dy
         if mask >> BIT_BLOCKED & 1:
             place = _PLACE_OF_TILE.get(int(layout.tiles[y, x]), "dispenser")
             events.append(Event(tick, seat, "blocked", "", place, x, y))
         for first, bits, thing, kind, place in _GROUPS:
             group = mask >> first & ((1 << bits) - 1)
             if group:
-                name = THINGS[thing + group.bit_length() - 1]
+                thing += group.bit_length() - 1
                 paid = kind == "delivery" and mask >> BIT_PAID & 1
-                reward = layout.rules.delivery_reward if paid else 0
-                events.append(Event(tick, seat, kind, name, place, x, y, reward))
+                reward = int(layout.spec[SPEC_PRICES + recipe_of_thing(thing)]) if paid else 0
+                events.append(Event(tick, seat, kind, THINGS[thing], place, x, y, reward))
     ready = written[OUT_READY]
     for number, place_ in enumerate(layout.pots):
         if ready >> number & 1:
-            kind_code = int(after[CELLS + layout.cell(place_)]) % POT_COUNT
-            events.append(Event(tick, None, "soup_ready", THINGS[kind_code + SOUP_OF_KIND], "pot", *place_))
+            soup = THINGS[thing_of(recipe_in(int(after[CELLS + layout.cell(place_)])))]
+            events.append(Event(tick, None, "soup_ready", soup, "pot", *place_))
     return tuple(events)

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from galley.kitchen.codes import ACTIONS, DELIVERIES, TICK
+from galley.kitchen.codes import ACTIONS, INTERACT, OUT_SIZE, TICK
 from galley.kitchen.events import Event, decode
 from galley.kitchen.layout import Layout
-from galley.kitchen.rules import classic as rules
-from galley.kitchen.state import KitchenView, state_size, view
+from galley.kitchen.rules.shared import finished, reset
+from galley.kitchen.rules.tick import step
+from galley.kitchen.state import KitchenView, score_of, state_size, view
 
 
 class Kitchen:
@@ -23,14 +24,14 @@ class Kitchen:
     def __init__(self, layout: Layout) -> None:
         self.layout = layout
         self.state: NDArray[np.int16] = np.zeros(state_size(layout), dtype=np.int16)
-        self.out: NDArray[np.int32] = np.zeros(4, dtype=np.int32)
+        self.out: NDArray[np.int32] = np.zeros(OUT_SIZE, dtype=np.int32)
         self._before = self.state.copy()
         self._spec = layout.spec
         self.reset()
 
     def reset(self) -> None:
-        """Nothing; sets the kitchen back to its start."""
-        rules.reset(self._spec, self.state)
+        """Set the kitchen back to its start."""
+        reset(self._spec, self.state)
         self._before[:] = self.state
         self.out[:] = 0
 
@@ -40,10 +41,10 @@ class Kitchen:
         Raises:
             ValueError: an action is not one of the six codes.
         """
-        if not (0 <= a0 <= 5 and 0 <= a1 <= 5):
+        if not (0 <= a0 <= INTERACT and 0 <= a1 <= INTERACT):
             raise ValueError(f"actions must be codes from 0 to {len(ACTIONS) - 1}, not {a0!r} and {a1!r}")
         self._before[:] = self.state
-        return int(rules.step(self._spec, self.state, int(a0), int(a1), self.out))
+        return int(step(self._spec, self.state, int(a0), int(a1), self.out))
 
     @property
     def tick(self) -> int:
@@ -53,12 +54,12 @@ class Kitchen:
     @property
     def score(self) -> int:
         """Reward summed since the start."""
-        return int(self.state[DELIVERIES]) * self.layout.rules.delivery_reward
+        return int(score_of(self.layout, self.state))
 
     @property
     def done(self) -> bool:
         """Whether the episode is over."""
-        return bool(rules.finished(self._spec, self.state))
+        return bool(finished(self._spec, self.state))
 
     @property
     def events(self) -> tuple[Event, ...]:

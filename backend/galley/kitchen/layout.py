@@ -18,11 +18,14 @@ from galley.kitchen.codes import (
     FLOOR,
     ONION_DISPENSER,
     POT,
+    POT_TICKS,
+    RULE_SETS,
     SERVING,
     THINGS,
     TILE_LETTERS,
     TOMATO_DISPENSER,
 )
+from galley.kitchen.pots import whole_soup
 
 Place = tuple[int, int]
 """A cell as (x, y): x grows east, y grows south, (0, 0) is the top left."""
@@ -56,8 +59,8 @@ class Rules:
     def problems(self) -> dict[str, str]:
         """What is wrong with each field, by the field's name; empty when all is well."""
         found = {}
-        if self.rule_set != "classic":
-            found["rule_set"] = f"rule set {self.rule_set!r} is unknown; use classic"
+        if self.rule_set not in RULE_SETS:
+            found["rule_set"] = f"rule set {self.rule_set!r} is unknown; use {' or '.join(RULE_SETS)}"
         bounds = {"cook_time_ticks": (1, 2000), "delivery_reward": (0, 10_000), "horizon_ticks": (1, 32_000)}
         for name, (low, high) in bounds.items():
             value = getattr(self, name)
@@ -211,16 +214,16 @@ class Layout:
         header = [
             self.width,
             self.height,
-            self.rules.cook_time_ticks,
-            self.rules.delivery_reward,
+            RULE_SETS.index(self.rules.rule_set),
             self.rules.horizon_ticks,
             len(orders),
             len(self.pots),
             *(self.cell(place) for place in self.starts),
         ]
+        recipes = [self.rules.cook_time_ticks] * POT_TICKS + [self.rules.delivery_reward] * POT_TICKS
         pots = [self.cell(place) for place in self.pots]
-        kinds = [THINGS.index(order) for order in orders]
-        return _frozen(np.array([*header, *self.tiles.ravel(), *pots, *kinds], dtype=np.int16))
+        ordered = [whole_soup(THINGS.index(order)) for order in orders]
+        return _frozen(np.array([*header, *recipes, *self.tiles.ravel(), *pots, *ordered], dtype=np.int16))
 
     def cell(self, place: Place) -> int:
         """The cell index of (x, y): y * W + x."""

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from galley.errors import GalleyError, InvalidFiles, Problem
 from galley.files.reading import FileModel, Loaded, load
-from galley.kitchen.codes import DISH_DISPENSER, ONION_DISPENSER, POT, SERVING, TOMATO_DISPENSER
+from galley.kitchen.codes import STATIONS
 from galley.kitchen.layout import Layout, Rules, grid_problems
 from galley.kitchen.reach import reachable_stations
 from galley.names import name_fix
@@ -35,15 +35,6 @@ class LayoutFile(FileModel):
     aliases: tuple[str, ...] = ()
     rules: RulesFile = RulesFile()
     grid: str
-
-
-_NAMES = {
-    POT: "pot",
-    ONION_DISPENSER: "onion dispenser",
-    TOMATO_DISPENSER: "tomato dispenser",
-    DISH_DISPENSER: "dish dispenser",
-    SERVING: "serving place",
-}
 
 
 def load_layout(path: Path, shown: str | None = None) -> Layout:
@@ -138,7 +129,7 @@ def _station_problems(file: Loaded[LayoutFile], layout: Layout) -> list[Problem]
     """Stations that no chef can reach, and kinds of station without which no soup can be served."""
     problems = []
     reached = reachable_stations(layout)
-    for tile, name in _NAMES.items():
+    for tile, name in STATIONS.items():
         for x, y in layout.places(tile):
             if not any((x, y) in seat for seat in reached):
                 told = f"the {name} at column {x + 1} cannot be reached by any chef"

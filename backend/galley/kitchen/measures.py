@@ -18,12 +18,12 @@ from galley.kitchen.codes import (
     BIT_TAKE,
     CELL,
     CHEF,
-    DELIVERIES,
     FACING,
     OUT_EVENTS,
     STAY,
     TICK,
 )
+from galley.kitchen.state import score_of
 from galley.kitchen.trajectory import Replay, Trajectory, play
 
 _INGREDIENTS = 3 << BIT_TAKE
@@ -79,7 +79,7 @@ def measures_of(episode: Replay, trajectory: Trajectory) -> Measures:
 
     return Measures(
         ticks=ticks,
-        score=int(episode.states[-1, DELIVERIES]) * rules.delivery_reward,
+        score=int(score_of(trajectory.layout, episode.states[-1])),
         delivery_ticks=tuple(delivered),
         ingredients=_each(masks & _INGREDIENTS != 0),
         dishes=_each(masks & _DISH != 0),

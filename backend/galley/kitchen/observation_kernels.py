@@ -17,14 +17,10 @@ from galley.kitchen.codes import (
     FACING,
     FLOOR,
     HELD,
-    INGREDIENTS_PER_SOUP,
     NOTHING,
     ONION,
     ONION_SOUP,
     POT,
-    POT_COUNT,
-    POT_TICKS,
-    SPEC_COOK_TIME,
     SPEC_HEIGHT,
     SPEC_HORIZON,
     SPEC_TILES,
@@ -32,6 +28,8 @@ from galley.kitchen.codes import (
     STAY,
     TICK,
 )
+from galley.kitchen.pots import amount_in, is_soup, onions_in, recipe_of_thing, ticks_in, ticks_left
+from galley.kitchen.rules.shared import ahead
 
 LARGEST = 255  # an observation's number is a byte
 URGENT_TICKS = 40
@@ -55,9 +53,12 @@ ANY_POT, EMPTY_POT, COOKING_POT, READY_POT = -1, 0, 1, 2
 
 @kernel
 def _grid_thing(thing: int, cell: int, cells: int, out: NDArray[uint8]) -> None:
-    """Nothing; marks a thing that lies or is held at `cell` in `out` uint8[26*H*W]."""
+    """Mark a thing that lies or is held at `cell` in `out` uint8[26*H*W]."""
     if thing >= ONION_SOUP:
-        out[(G_IN_SOUP + thing - ONION_SOUP) * cells + cell] += INGREDIENTS_PER_SOUP
+        recipe = recipe_of_thing(thing)
+        onions = onions_in(recipe)
+        out[G_IN_SOUP * cells + cell] += onions
+        out[(G_IN_SOUP + 1) * cells + cell] += amount_in(recipe) - onions
         out[G_DONE * cells + cell] += 1
     elif thing == DISH:
         out[G_DISHES * cells + cell] += 1
@@ -69,7 +70,7 @@ def _grid_thing(thing: int, cell: int, cells: int, out: NDArray[uint8]) -> None:
 def _grid(
     spec: NDArray[int16], static: NDArray[uint8], state: NDArray[int16], seat: int, out: NDArray[uint8]
 ) -> None:
-    """Nothing; writes one seat's `grid` into `out` uint8[26*H*W]; `static` holds the map's channels."""
+    """Write one seat's `grid` into `out` uint8[26*H*W]; `static` holds the map's channels."""
     cells = int(spec[SPEC_WIDTH]) * int(spec[SPEC_HEIGHT])
     for index in range(static.size):
         out[index] = static[index]
@@ -86,13 +87,15 @@ def _grid(
         if spec[SPEC_TILES + cell] != POT:
             _grid_thing(thing, cell, cells, out)
             continue
-        kind = thing % POT_COUNT - ONION
-        count = thing // POT_COUNT % POT_COUNT
-        if count < INGREDIENTS_PER_SOUP:
-            out[(G_IN_POT + kind) * cells + cell] = count
+        onions = onions_in(thing)
+        tomatoes = amount_in(thing) - onions
+        if not is_soup(thing):
+            out[G_IN_POT * cells + cell] = onions
+            out[(G_IN_POT + 1) * cells + cell] = tomatoes
             continue
-        remaining = int(spec[SPEC_COOK_TIME]) - thing // POT_TICKS
-        out[(G_IN_SOUP + kind) * cells + cell] = count
+        remaining = ticks_left(spec, thing)
+        out[G_IN_SOUP * cells + cell] = onions
+        out[(G_IN_SOUP + 1) * cells + cell] = tomatoes
         out[G_REMAINING * cells + cell] = min(remaining, LARGEST)
         if remaining <= 0:
             out[G_DONE * cells + cell] = 1
@@ -108,7 +111,7 @@ def _grid(
 def _grid_2019(
     spec: NDArray[int16], static: NDArray[uint8], state: NDArray[int16], seat: int, out: NDArray[uint8]
 ) -> None:
-    """Nothing; writes one seat's `overcooked-2019-grid` into `out` uint8[W*H*20]."""
+    """Write one seat's `overcooked-2019-grid` into `out` uint8[W*H*20]."""
     width = int(spec[SPEC_WIDTH])
     height = int(spec[SPEC_HEIGHT])
     for index in range(static.size):
@@ -140,8 +143,8 @@ def _grid_2019(
         at = ((cell % width) * height + cell // width) * C_CHANNELS
         if spec[SPEC_TILES + cell] == POT:
             if not held_soup:
-                out[at + C_IN_POT] = thing // POT_COUNT % POT_COUNT
-                out[at + C_COOKED] = min(thing // POT_TICKS, LARGEST)
+                out[at + C_IN_POT] = amount_in(thing)
+                out[at + C_COOKED] = min(ticks_in(thing), LARGEST)
         elif thing == ONION_SOUP and not held_soup:
             out[at + C_SOUPS] = 1
         elif thing == DISH and not held_dish:
@@ -155,7 +158,7 @@ def _closest(
     spec: NDArray[int16], costs: NDArray[int16], targets: NDArray[int16], kind: int, wanted: int,
     state: NDArray[int16], chef: int, out: NDArray[float32], at: int,
 ) -> None:  # fmt: skip
-    """Nothing; writes (dx, dy) to the closest target of a kind (and for pots, condition) at `out[at]`."""
+    """Write (dx, dy) to the closest target of a kind (and for pots, condition) at `out[at]`."""
     cell = int(state[chef + CELL])
     pose = cell * STAY + state[chef + FACING]
     best = NO_WAY
@@ -166,12 +169,10 @@ def _closest(
         target = int(targets[index, 1])
         if wanted != ANY_POT:
             pot = int(state[CELLS + target])
-            count = pot // POT_COUNT % POT_COUNT
             if wanted == EMPTY_POT:
-                fits = count == 0
+                fits = pot == 0
             else:
-                ready = pot // POT_TICKS >= spec[SPEC_COOK_TIME]
-                fits = count == INGREDIENTS_PER_SOUP and ready == (wanted == READY_POT)
+                fits = is_soup(pot) and (ticks_left(spec, pot) <= 0) == (wanted == READY_POT)
             if not fits:
                 continue
         if found == NO_WAY or costs[pose, index] < best:
@@ -188,7 +189,7 @@ def _player_2019(
     spec: NDArray[int16], costs: NDArray[int16], targets: NDArray[int16],
     state: NDArray[int16], chef: int, out: NDArray[float32],
 ) -> None:  # fmt: skip
-    """Nothing; writes the 29 numbers of the player at `chef` of the state into `out` float32[29] of zeros."""
+    """Write the 29 numbers of the player at `chef` of the state into `out` float32[29] of zeros."""
     held = state[chef + HELD]
     out[state[chef + FACING]] = 1
     if held == ONION:
@@ -206,9 +207,9 @@ def _player_2019(
         _closest(spec, costs, targets, F_DISHES, ANY_POT, state, chef, out, F_DISH)
     _closest(spec, costs, targets, F_SERVINGS, ANY_POT, state, chef, out, F_SERVING)
     cell = int(state[chef + CELL])
-    width = spec[SPEC_WIDTH]
-    for facing, ahead in enumerate((cell - width, cell + width, cell + 1, cell - 1)):
-        if spec[SPEC_TILES + ahead] != FLOOR:
+    width = int(spec[SPEC_WIDTH])
+    for facing in range(STAY):
+        if spec[SPEC_TILES + ahead(cell, facing, width)] != FLOOR:
             out[F_WALLS + facing] = 1
 
 
@@ -217,7 +218,7 @@ def _features_2019(
     spec: NDArray[int16], costs: NDArray[int16], targets: NDArray[int16],
     state: NDArray[int16], seat: int, out: NDArray[float32],
 ) -> None:  # fmt: skip
-    """Nothing; writes one seat's `overcooked-2019-features` into `out` float32[62]."""
+    """Write one seat's `overcooked-2019-features` into `out` float32[62]."""
     out[:] = 0
     own = CHEF * seat
     other = CHEF - own
@@ -235,7 +236,7 @@ def grid(
     spec: NDArray[int16], static: NDArray[uint8], states: NDArray[int16], seats: NDArray[int64],
     out: NDArray[uint8],
 ) -> None:  # fmt: skip
-    """Nothing; `states` int16[B,S], `seats` int64[B or 1, K] -> `out` uint8[B,K,26*H*W]."""
+    """From `states` int16[B,S], `seats` int64[B or 1, K] to `out` uint8[B,K,26*H*W]."""
     for index in range(states.shape[0]):
         row = index if seats.shape[0] > 1 else 0
         for slot in range(seats.shape[1]):
@@ -247,7 +248,7 @@ def grid_2019(
     spec: NDArray[int16], static: NDArray[uint8], states: NDArray[int16], seats: NDArray[int64],
     out: NDArray[uint8],
 ) -> None:  # fmt: skip
-    """Nothing; `states` int16[B,S], `seats` int64[B or 1, K] -> `out` uint8[B,K,W*H*20]."""
+    """From `states` int16[B,S], `seats` int64[B or 1, K] to `out` uint8[B,K,W*H*20]."""
     for index in range(states.shape[0]):
         row = index if seats.shape[0] > 1 else 0
         for slot in range(seats.shape[1]):
@@ -259,7 +260,7 @@ def features_2019(
     spec: NDArray[int16], costs: NDArray[int16], targets: NDArray[int16], states: NDArray[int16],
     seats: NDArray[int64], out: NDArray[float32],
 ) -> None:  # fmt: skip
-    """Nothing; `costs` int16[H*W*4,T], `targets` int16[T,2] (kind, cell) -> `out` float32[B,K,62]."""
+    """From `costs` int16[H*W*4,T], `targets` int16[T,2] (kind, cell) to `out` float32[B,K,62]."""
     for index in range(states.shape[0]):
         row = index if seats.shape[0] > 1 else 0
         for slot in range(seats.shape[1]):

@@ -19,6 +19,7 @@ from galley.kitchen.codes import (
     TOMATO_DISPENSER,
 )
 from galley.kitchen.layout import Layout
+from galley.kitchen.state import state_size
 
 ENCODINGS: Final[dict[str, str]] = {
     "grid": "26 channels [C, H, W] of whole numbers: the field's present lossless encoding.",
@@ -33,8 +34,7 @@ _GRID_2019_STATIC: Final = (POT, COUNTER, ONION_DISPENSER, DISH_DISPENSER, SERVI
 _FIRST_STATIC: Final = 10
 _FEATURES: Final = 62
 
-_BOTH = np.array([[0, 1]], dtype=np.int64)
-_BOTH.flags.writeable = False
+_BOTH = np.array([[0, 1]], dtype=np.int64)  # a kernel for what is read only would be compiled besides
 
 
 class Encoder:
@@ -99,7 +99,7 @@ class Encoder:
         shape: tuple[int, ...],
         out: NDArray[Any] | None,
     ) -> NDArray[Any]:
-        size = len(self.layout.tiles.ravel()) + 9
+        size = state_size(self.layout)
         if states.ndim != 2 or states.shape[1] != size or states.dtype != np.int16:
             raise ValueError(f"states must be int16 [B, {size}], not {states.dtype} {list(states.shape)}")
         if out is None:

@@ -18,17 +18,15 @@ from galley.kitchen.codes import (
     FLOOR,
     HELD,
     INGREDIENTS_PER_SOUP,
-    ONION,
     ORDERS_DELIVERED,
     POT,
-    POT_COUNT,
     POT_TICKS,
     STAY,
     THINGS,
     TICK,
-    TOMATO,
 )
 from galley.kitchen.layout import Layout, Place
+from galley.kitchen.pots import amount_in, is_soup, onions_in, recipe_of, ticks_in, ticks_left
 
 
 @dataclass(frozen=True)
@@ -43,12 +41,17 @@ class ChefView:
 
 @dataclass(frozen=True)
 class PotView:
-    """One pot: kind (0 none, 1 onion, 2 tomato), how many of them, cooking ticks so far, readiness."""
+    """One pot: onions and tomatoes in it, cooking ticks so far, readiness."""
 
-    kind: int = 0
-    count: int = 0
+    onions: int = 0
+    tomatoes: int = 0
     ticks: int = 0
     ready: bool = False
+
+    @property
+    def count(self) -> int:
+        """How many ingredients are in it."""
+        return self.onions + self.tomatoes
 
 
 @dataclass(frozen=True)
@@ -69,14 +72,16 @@ def state_size(layout: Layout) -> int:
     return CELLS + layout.width * layout.height
 
 
-def pack_pot(kind: int, count: int, ticks: int) -> int:
-    """One number for a pot's contents."""
-    return kind + POT_COUNT * count + POT_TICKS * ticks
+def pot_view(layout: Layout, pot: int) -> PotView:
+    """What a packed pot holds."""
+    onions = onions_in(pot)
+    ready = is_soup(pot) and ticks_left(layout.spec, pot) <= 0
+    return PotView(onions, amount_in(pot) - onions, ticks_in(pot), ready)
 
 
-def unpack_pot(packed: int) -> tuple[int, int, int]:
-    """(kind, count, cooking ticks) of a packed pot."""
-    return packed % POT_COUNT, packed // POT_COUNT % POT_COUNT, packed // POT_TICKS
+def score_of(layout: Layout, states: NDArray[np.int16]) -> NDArray[np.int32]:
+    """int32[...]: the points made since the start in each state of int16[..., S]."""
+    return states[..., DELIVERIES].astype(np.int32) * layout.rules.delivery_reward
 
 
 def view(layout: Layout, state: NDArray[np.int16]) -> KitchenView:
@@ -85,11 +90,7 @@ def view(layout: Layout, state: NDArray[np.int16]) -> KitchenView:
     chefs = tuple(
         ChefView(*layout.place(row[at + CELL]), row[at + FACING], row[at + HELD]) for at in (0, CHEF)
     )
-    pots = {}
-    for place in layout.pots:
-        kind, count, ticks = unpack_pot(row[CELLS + layout.cell(place)])
-        ready = count == INGREDIENTS_PER_SOUP and ticks >= layout.rules.cook_time_ticks
-        pots[place] = PotView(kind, count, ticks, ready)
+    pots = {place: pot_view(layout, row[CELLS + layout.cell(place)]) for place in layout.pots}
     lying = {place: row[CELLS + layout.cell(place)] for place in layout.counters}
     return KitchenView(
         chefs=(chefs[0], chefs[1]),
@@ -98,7 +99,7 @@ def view(layout: Layout, state: NDArray[np.int16]) -> KitchenView:
         tick=row[TICK],
         orders_delivered=row[ORDERS_DELIVERED],
         deliveries=row[DELIVERIES],
-        score=row[DELIVERIES] * layout.rules.delivery_reward,
+        score=int(score_of(layout, state)),
     )
 
 
@@ -115,7 +116,7 @@ def from_view(layout: Layout, seen: KitchenView) -> NDArray[np.int16]:
     for place, thing in seen.things.items():
         state[CELLS + layout.cell(place)] = thing
     for place, pot in seen.pots.items():
-        state[CELLS + layout.cell(place)] = pack_pot(pot.kind, pot.count, pot.ticks)
+        state[CELLS + layout.cell(place)] = recipe_of(pot.onions, pot.tomatoes) + POT_TICKS * pot.ticks
     return state
 
 
@@ -136,13 +137,13 @@ def state_problem(layout: Layout, state: NDArray[np.int16]) -> str | None:
     if row[TICK] < 0 or row[DELIVERIES] < 0 or not 0 <= row[ORDERS_DELIVERED] <= orders:
         return f"tick, orders delivered, deliveries are {row[TICK:CELLS]}"
     for cell, (tile, number) in enumerate(zip(tiles, row[CELLS:], strict=True)):
-        kind, count, ticks = unpack_pot(number)
         fits = number == 0
         if tile == COUNTER:
             fits = 0 <= number < len(THINGS)
         elif tile == POT and number > 0:
-            full = count == INGREDIENTS_PER_SOUP
-            fits = kind in (ONION, TOMATO) and count > 0 and 0 <= ticks <= full * layout.rules.cook_time_ticks
+            amount = amount_in(number)
+            most = layout.rules.cook_time_ticks if amount == INGREDIENTS_PER_SOUP else 0
+            fits = amount > 0 and onions_in(number) in (0, amount) and ticks_in(number) <= most
         if not fits:
             return f"cell {cell} holds {number}"
     return None

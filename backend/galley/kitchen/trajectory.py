@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 
 from galley.errors import GalleyError
 from galley.files.whole import write_whole
-from galley.kitchen.codes import ACTIONS, DELIVERIES, TICK
+from galley.kitchen.codes import ACTIONS, OUT_SIZE, TICK
 from galley.kitchen.events import Event, decode
 from galley.kitchen.layout import Layout
-from galley.kitchen.rules import classic as rules
-from galley.kitchen.state import state_problem, state_size
+from galley.kitchen.rules.shared import reset
+from galley.kitchen.rules.tick import run
+from galley.kitchen.state import score_of, state_problem, state_size
 
 FORMAT: Final = 1
 
@@ -83,7 +84,7 @@ class Replay:
     @property
     def score(self) -> int:
         """The points that its kitchen shows at the end."""
-        return int(self.states[-1, DELIVERIES]) * self.layout.rules.delivery_reward
+        return int(score_of(self.layout, self.states[-1]))
 
     def to_its_end(self) -> Replay:
         """The same without the joint actions that came after the episode was over."""
@@ -100,7 +101,7 @@ class Replay:
 def start(layout: Layout) -> NDArray[np.int16]:
     """int16[S]: the state in which an episode on this layout begins."""
     state = np.zeros(state_size(layout), dtype=np.int16)
-    rules.reset(layout.spec, state)
+    reset(layout.spec, state)
     return state
 
 
@@ -110,9 +111,9 @@ def play(
     """The episode that `joint_actions` uint8[T,2] make from `initial` int16[S] or the layout's start."""
     ticks = len(joint_actions)
     states = np.empty((ticks + 1, state_size(layout)), dtype=np.int16)
-    out = np.zeros((ticks, 4), dtype=np.int32)
+    out = np.zeros((ticks, OUT_SIZE), dtype=np.int32)
     first = start(layout) if initial is None else np.array(initial, dtype=np.int16)
-    rules.run(layout.spec, first, np.ascontiguousarray(joint_actions, dtype=np.uint8), states, out)
+    run(layout.spec, first, np.ascontiguousarray(joint_actions, dtype=np.uint8), states, out)
     return Replay(layout, states, out)
 
 

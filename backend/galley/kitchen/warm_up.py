@@ -5,24 +5,25 @@ from __future__ import annotations
 import numpy as np
 
 from galley.kitchen.batch import KitchenBatch
+from galley.kitchen.codes import OUT_SIZE, STAY
 from galley.kitchen.kitchen import Kitchen
 from galley.kitchen.layout import Layout
 from galley.kitchen.observations import ENCODINGS, Encoder
-from galley.kitchen.rules import classic as rules
+from galley.kitchen.rules.tick import run
 from galley.kitchen.state import state_size
 
 
 def warm() -> None:
-    """Nothing; afterwards no call into the kitchen compiles. Takes seconds the first time on a machine."""
+    """Compile, or fetch from the cache, all that kitchens call. Takes seconds the first time on a machine."""
     layout = Layout.from_ascii("warm", "XPOX\nX12X\nXDSX")
     kitchen = Kitchen(layout)
-    kitchen.step(4, 4)
+    kitchen.step(STAY, STAY)
     _ = kitchen.done
     batch = KitchenBatch(layout, 1)
-    batch.step(np.full((1, 2), 4))
-    out = np.zeros((1, 4), dtype=np.int32)
+    batch.step(np.full((1, 2), STAY))
+    out = np.zeros((1, OUT_SIZE), dtype=np.int32)
     states = np.zeros((2, state_size(layout)), dtype=np.int16)
-    rules.run(layout.spec, kitchen.state, np.full((1, 2), 4, dtype=np.uint8), states, out)
+    run(layout.spec, kitchen.state, np.full((1, 2), STAY, dtype=np.uint8), states, out)
     for name in ENCODINGS:
         encoder = Encoder(layout, name)
         encoder.both(batch.states)

@@ -146,7 +146,7 @@ def durations(known: Distances, seat: int) -> NDArray[np.float64]:
 
 
 def _add_cooking(cook_time: int, pots: int, *teams: NDArray[np.float64]) -> None:
-    """Nothing; lengthens the fetching of a soup by what is likely left of its cooking.
+    """Lengthen the fetching of a soup by what is likely left of its cooking.
 
     That is what remains when a dish was taken at once, less the time in which the quicker chef fills the
     other pots meanwhile: who has several pots to serve seldom waits at one.

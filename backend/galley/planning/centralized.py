@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from galley.errors import GalleyError
-from galley.kitchen.codes import CELLS, CHEF, DELIVERIES, HELD, POT_TICKS, STAY
+from galley.kitchen.codes import CELLS, CHEF, DELIVERIES, HELD, OUT_SIZE, POT_TICKS, STAY
 from galley.kitchen.layout import Layout
-from galley.kitchen.rules.classic import step
+from galley.kitchen.rules.tick import step
 from galley.kitchen.trajectory import start
 from galley.planning.robots import QMDP
 from galley.planning.team import TeamPlan, TeamPlanner, TeamSearch
@@ -69,7 +69,7 @@ class Centralized:
         self._alone.act(start(layout), 0)  # its kernels are fetched now, not in the middle of a round
         self._vain_ticks, self._broken = 0, 0
         self._soups_alone, self._alone_until = 1, 0
-        self._out = np.zeros(4, dtype=np.int32)
+        self._out = np.zeros(OUT_SIZE, dtype=np.int32)
         self._take_up_quick(start(layout))
 
     def act(self, state: NDArray[np.int16], tick: int) -> int:
@@ -121,7 +121,7 @@ class Centralized:
         self._begin_at = TRIAL_TICKS if self._next_at > TRIAL_TICKS else self._next_at
 
     def _plan_ahead(self, state: NDArray[np.int16]) -> None:
-        """Nothing; works on the next plan, and takes it up if it is due in `state`."""
+        """Work on the next plan, and take it up if it is due in `state`."""
         if self._at == self._next_at:
             plan = self._ahead.plan() if self._begin_at < self._next_at else None
             served = [] if plan is None else plan.served_at

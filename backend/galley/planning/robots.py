@@ -7,7 +7,9 @@ from numpy.typing import NDArray
 
 from galley.compiled.randomness import uniform
 from galley.errors import GalleyError
+from galley.kitchen.codes import OUT_SIZE
 from galley.kitchen.layout import Layout
+from galley.kitchen.state import state_size
 from galley.planning.brain import brain
 from galley.planning.kernels.robot_kernel import ROBOT_MEMORY, Brain, robot_action, robot_observe
 from galley.planning.kernels.subtask_kernel import KINDS
@@ -38,8 +40,8 @@ class _Robot:
         self._seat, self._seed = seat, seed
         self._memory[:] = 0
         self._belief[:] = 0
-        self._after = np.zeros(self._brain.joint.floor_of.size + 9, dtype=np.int16)
-        self._out = np.zeros(4, dtype=np.int32)
+        self._after = np.zeros(state_size(layout), dtype=np.int16)
+        self._out = np.zeros(OUT_SIZE, dtype=np.int32)
 
     def act(self, state: NDArray[np.int16], tick: int) -> int:
         """The first action of the joint plan to the best subtask; a random move to a free cell when stuck."""

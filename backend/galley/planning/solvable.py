@@ -9,21 +9,14 @@ from galley.kitchen.codes import (
     ONION_DISPENSER,
     POT,
     SERVING,
+    STATIONS,
     TOMATO_DISPENSER,
 )
 from galley.planning.distances import Distances
 
-_NAMES = {
-    POT: "pot",
-    ONION_DISPENSER: "onion dispenser",
-    TOMATO_DISPENSER: "tomato dispenser",
-    DISH_DISPENSER: "dish dispenser",
-    SERVING: "serving place",
-}
-
 
 def require_solvable(known: Distances) -> None:
-    """Nothing, if every soup that may be ordered can be made and served by the two chefs together.
+    """Make sure that every soup that may be ordered can be made and served by the two chefs together.
 
     Raises:
         GalleyError: some station is missing or out of reach, or what one chef has cannot get to the other;
@@ -43,12 +36,12 @@ def require_solvable(known: Distances) -> None:
         there = tiles == station
         if not there.any():
             raise GalleyError(
-                f"layout {layout.name!r} has no {_NAMES[station]}; add one that a chef can reach"
+                f"layout {layout.name!r} has no {STATIONS[station]}; add one that a chef can reach"
             )
         if not (known.reachable & there).any():
             where = layout.place(int(there.argmax()))
             raise GalleyError(
-                f"layout {layout.name!r}: no chef can reach the {_NAMES[station]} at {where}; "
+                f"layout {layout.name!r}: no chef can reach the {STATIONS[station]} at {where}; "
                 "clear a way to it"
             )
     if (known.reachable.all(axis=0) & (tiles == COUNTER)).any():
@@ -68,5 +61,5 @@ def require_solvable(known: Distances) -> None:
             lacking = DISH_DISPENSER if not servers else POT
             raise GalleyError(
                 f"layout {layout.name!r}: the chefs stand apart and share no counter, so no chef can "
-                f"reach the {_NAMES[lacking]} with what it needs there; open a counter between them"
+                f"reach the {STATIONS[lacking]} with what it needs there; open a counter between them"
             )

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from galley.errors import GalleyError
-from galley.kitchen.codes import DELIVERIES, ORDERS_DELIVERED
+from galley.kitchen.codes import DELIVERIES, ORDERS_DELIVERED, OUT_SIZE
 from galley.kitchen.layout import Layout
-from galley.kitchen.rules.classic import step
+from galley.kitchen.rules.tick import step
+from galley.kitchen.state import state_size
 from galley.planning.brain import brain
 from galley.planning.kernels.robot_kernel import Brain
 from galley.planning.kernels.team_kernel import (
@@ -74,7 +75,7 @@ class TeamSearch:
         nodes = width * most_ticks
         keys = 1 << min(20, (nodes * PAIRS).bit_length())
         self._search = Search(
-            states=np.zeros((nodes, layout.width * layout.height + 9), dtype=np.int16),
+            states=np.zeros((nodes, state_size(layout)), dtype=np.int16),
             parents=np.zeros(nodes, dtype=np.int32),
             legs=np.zeros((nodes, LEG_TICKS, 2), dtype=np.uint8),
             lengths=np.zeros(nodes, dtype=np.int16),
@@ -116,7 +117,7 @@ class TeamSearch:
         actions = np.concatenate([*legs[::-1], np.empty((0, 2), dtype=np.uint8)])
         states = np.empty((len(actions) + 1, search.states.shape[1]), dtype=np.int16)
         states[0] = search.states[0]
-        out = np.zeros(4, dtype=np.int32)
+        out = np.zeros(OUT_SIZE, dtype=np.int32)
         for tick, (act0, act1) in enumerate(actions.tolist()):
             states[tick + 1] = states[tick]
             step(self.layout.spec, states[tick + 1], act0, act1, out)

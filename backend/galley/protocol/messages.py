@@ -12,7 +12,7 @@ import orjson
 
 from galley.outcomes import ROUND_OUTCOMES
 
-PROTOCOL = 1
+PROTOCOL = 2
 MAX_MESSAGE_CHARS = 1024
 KEYS = ("up", "down", "left", "right", "interact")
 RELEASE_REASONS = ("blur", "hidden", "shown", "pagehide")
@@ -175,7 +175,7 @@ MESSAGES: tuple[Message, ...] = (
             Field("cook_time", "whole number", "ticks a soup cooks"),
             Field("chefs", "list", "seat 0 and seat 1 as [x, y, facing, held]"),
             Field("things", "list", "things lying on counters as [x, y, thing]"),
-            Field("pots", "list", "every pot as [x, y, kind, count, ticks, ready]"),
+            Field("pots", "list", "every pot as [x, y, onions, tomatoes, ticks, ready]"),
             Field("score", "whole number", "points so far, of all episodes"),
             Field("goal", "whole number or null", "points that earn the bonus"),
             Field("round", "whole number", "number of the round, 0 for a tutorial"),

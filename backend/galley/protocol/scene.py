@@ -14,13 +14,11 @@ from galley.kitchen.codes import (
     CELL,
     CELLS,
     CHEF,
-    DELIVERIES,
     FACING,
     HELD,
-    INGREDIENTS_PER_SOUP,
     ORDERS_DELIVERED,
 )
-from galley.kitchen.state import unpack_pot
+from galley.kitchen.state import pot_view, score_of
 
 State = NDArray[int16]
 
@@ -34,7 +32,6 @@ class Scene:
         self._pots = {layout.cell(place) for place in layout.pots}
         self._counters = [layout.cell(place) for place in layout.counters]
         self._places = [layout.place(cell) for cell in range(layout.tiles.size)]
-        self._reward = layout.rules.delivery_reward
 
     def chefs(self, state: State) -> list[list[int]]:
         """Seat 0 and seat 1 as [x, y, facing, held]."""
@@ -52,7 +49,7 @@ class Scene:
             "chefs": self._chefs(row),
             "things": [self._thing(cell, cells[cell]) for cell in self._counters if cells[cell]],
             "pots": [self._pot(cell, cells[cell]) for cell in sorted(self._pots)],
-            "score": score_before + row[DELIVERIES] * self._reward,
+            "score": score_before + int(score_of(self.layout, state)),
             "orders": None if orders is None else list(orders[row[ORDERS_DELIVERED] :]),
         }
 
@@ -68,7 +65,7 @@ class Scene:
                 pots.append(self._pot(cell, cells[cell]))
             elif changed:
                 things.append(self._thing(cell, cells[cell]))
-        score = score_before + new[DELIVERIES] * self._reward
+        score = score_before + int(score_of(self.layout, after))
         return {"chefs": self._chefs(new), "things": things, "pots": pots, "score": score}
 
     def _chefs(self, row: list[int]) -> list[list[int]]:
@@ -78,9 +75,8 @@ class Scene:
         return [*self._places[cell], thing]
 
     def _pot(self, cell: int, packed: int) -> list[int | bool]:
-        kind, count, ticks = unpack_pot(packed)
-        ready = count == INGREDIENTS_PER_SOUP and ticks >= self.layout.rules.cook_time_ticks
-        return [*self._places[cell], kind, count, ticks, ready]
+        pot = pot_view(self.layout, packed)
+        return [*self._places[cell], pot.onions, pot.tomatoes, pot.ticks, pot.ready]
 
 
 def happenings(events: Iterable[Event]) -> list[list[Any]]:

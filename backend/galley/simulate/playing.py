@@ -22,7 +22,7 @@ from galley.simulate.seen import MakeAgent, Seen
 CLOSE_REPLACED: Final = 4001
 CLOSE_ENDED: Final = 4002
 CLOSE_REFUSED: Final = 4003
-PROTOCOL: Final = 1
+PROTOCOL: Final = 2
 PING_EVERY_S: Final = 1.0
 REACTION_OF_TICK: Final = (0.1, 0.4)
 """When in a tick a key is pressed, as shares of it."""

@@ -94,8 +94,8 @@ class Seen:
         self._things.update({(x, y): thing for x, y, thing in frame["things"]})
         self._pots.update(
             {
-                (x, y): PotView(kind, count, ticks, bool(ready))
-                for x, y, kind, count, ticks, ready in frame["pots"]
+                (x, y): PotView(onions, tomatoes, ticks, bool(ready))
+                for x, y, onions, tomatoes, ticks, ready in frame["pots"]
             }
         )
 

@@ -82,9 +82,9 @@ def test_what_the_browser_is_shown_is_what_is_stored(served: Served, person: Par
         assert message["score"] == view.score
         for x, y, thing in message["things"]:
             assert view.things.get((x, y), 0) == thing
-        for x, y, kind, count, ticks, ready in message["pots"]:
+        for x, y, onions, tomatoes, ticks, ready in message["pots"]:
             pot = view.pots[x, y]
-            assert (pot.kind, pot.count, pot.ticks, pot.ready) == (kind, count, ticks, ready)
+            assert (pot.onions, pot.tomatoes, pot.ticks, pot.ready) == (onions, tomatoes, ticks, ready)
 
 
 def test_a_held_key_walks_every_tick_and_stops_after_its_release(served: Served, person: Participant) -> None:

@@ -91,7 +91,7 @@ def _faces_floor(joint: JointTables, poses: NDArray[int16], count: int) -> bool:
 
 @kernel
 def _fill(joint: JointTables, goal0: int, goal1: int, table: NDArray[int16]) -> None:
-    """Nothing; `table` int16[F + 4, F + 4] becomes the fewest ticks until both goals hold at once."""
+    """Fill `table` int16[F + 4, F + 4] with the fewest ticks until both goals hold at once."""
     floors = joint.cell_of.size
     size = floors + MOST_POSES
     poses0 = joint.ends[goal0]
@@ -217,7 +217,7 @@ def joint_cost(joint: JointTables, goal0: int, goal1: int, pose0: int, pose1: in
 
 @lean_kernel
 def moved(joint: JointTables, pose0: int, pose1: int, act0: int, act1: int) -> tuple[int, int]:
-    """The poses after one tick in which the chefs move or stay, as `galley.kitchen.rules.classic` has it."""
+    """The poses after one tick in which the chefs move or stay, as `galley.kitchen.rules.shared` has it."""
     at0 = pose0 // 4
     at1 = pose1 // 4
     facing0 = act0 if act0 < STAY else pose0 % 4

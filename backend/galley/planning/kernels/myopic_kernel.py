@@ -21,13 +21,10 @@ from galley.kitchen.codes import (
     NOTHING,
     ONION,
     ONION_DISPENSER,
+    ONION_SOUP,
     ORDERS_DELIVERED,
     POT,
-    POT_COUNT,
-    POT_TICKS,
     SERVING,
-    SOUP_OF_KIND,
-    SPEC_COOK_TIME,
     SPEC_HEIGHT,
     SPEC_ORDERS,
     SPEC_POTS,
@@ -37,6 +34,8 @@ from galley.kitchen.codes import (
     TOMATO,
     TOMATO_DISPENSER,
 )
+from galley.kitchen.pots import amount_in, is_all, is_soup, recipe_in, recipe_of_thing, soup_of, ticks_left
+from galley.kitchen.rules.shared import ahead
 
 # What the chef remembers of the tick before, int16 [MEMORY_SIZE].
 KNOWN = 0
@@ -87,12 +86,13 @@ def _lying(state: NDArray[int16], spec: NDArray[int16], reach: NDArray[bool_], s
 
 
 @lean_kernel
-def open_order(spec: NDArray[int16], state: NDArray[int16], ahead: int) -> int:
-    """The ingredient of the order `ahead` places behind the first open one; NOTHING beyond the list's end."""
-    place = state[ORDERS_DELIVERED] + ahead
+def open_order(spec: NDArray[int16], state: NDArray[int16], later: int) -> int:
+    """The ingredient of the order `later` places behind the first open one; NOTHING beyond the list's end."""
+    place = state[ORDERS_DELIVERED] + later
     if place >= spec[SPEC_ORDERS]:
         return NOTHING
-    return int(spec[SPEC_TILES + spec[SPEC_WIDTH] * spec[SPEC_HEIGHT] + spec[SPEC_POTS] + place])
+    recipe = int(spec[SPEC_TILES + spec[SPEC_WIDTH] * spec[SPEC_HEIGHT] + spec[SPEC_POTS] + place])
+    return ONION if is_all(recipe, ONION) else TOMATO
 
 
 @lean_kernel
@@ -106,20 +106,18 @@ def wanted_kind(spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool
     onion_soups = 0
     tomato_soups = 0
     for cell in range(reach.shape[1]):
-        held = state[CELLS + cell]
-        kind = NOTHING
+        recipe = 0
         if _tile(spec, cell) == POT:
-            kind = held % POT_COUNT
-        elif _tile(spec, cell) == COUNTER and held > SOUP_OF_KIND:
-            kind = held - SOUP_OF_KIND
-        onion_soups += kind == ONION
-        tomato_soups += kind == TOMATO
+            recipe = recipe_in(int(state[CELLS + cell]))
+        elif _tile(spec, cell) == COUNTER and state[CELLS + cell] >= ONION_SOUP:
+            recipe = recipe_of_thing(int(state[CELLS + cell]))
+        onion_soups += is_all(recipe, ONION)
+        tomato_soups += is_all(recipe, TOMATO)
     for seat in range(2):
-        held = state[CHEF * seat + HELD]
-        onion_soups += held == ONION + SOUP_OF_KIND
-        tomato_soups += held == TOMATO + SOUP_OF_KIND
-    for ahead in range(spec[SPEC_ORDERS]):
-        kind = open_order(spec, state, ahead)
+        onion_soups += state[CHEF * seat + HELD] == soup_of(ONION)
+        tomato_soups += state[CHEF * seat + HELD] == soup_of(TOMATO)
+    for later in range(spec[SPEC_ORDERS]):
+        kind = open_order(spec, state, later)
         if kind == ONION and onion_soups > 0:
             onion_soups -= 1
         elif kind == TOMATO and tomato_soups > 0:
@@ -132,11 +130,9 @@ def wanted_kind(spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool
 @lean_kernel
 def pot_room(packed: int, wanted: int, ingredient: int, any_order: bool) -> int:
     """How many of an ingredient a pot can take, 0 if it should get none."""
-    count = packed // POT_COUNT % POT_COUNT
-    kind = packed % POT_COUNT
-    if count == 0:
+    if packed == 0:
         return INGREDIENTS_PER_SOUP if any_order or ingredient == wanted else 0
-    return INGREDIENTS_PER_SOUP - count if kind == ingredient else 0
+    return INGREDIENTS_PER_SOUP - amount_in(packed) if is_all(packed, ingredient) else 0
 
 
 @lean_kernel
@@ -149,9 +145,9 @@ def need_of(
     for cell in range(reach.shape[1]):
         if _tile(spec, cell) != POT or not reach[seat, cell] or (not_for >= 0 and reach[not_for, cell]):
             continue
-        packed = state[CELLS + cell]
+        packed = int(state[CELLS + cell])
         if thing == DISH:
-            need += packed // POT_COUNT % POT_COUNT == INGREDIENTS_PER_SOUP
+            need += is_soup(packed)
         else:
             need += pot_room(packed, wanted, thing, False)
     return need
@@ -247,7 +243,7 @@ def _empty_handed(
     for kind in (ONION, TOMATO):
         ordered = spec[SPEC_ORDERS] == 0 or open_order(spec, state, 0) == kind
         if ordered and (serves or reaches_tile(spec, reach, other, SERVING)):
-            soup = _source(spec, state, reach, costs, seat, kind + SOUP_OF_KIND, not serves)
+            soup = _source(spec, state, reach, costs, seat, soup_of(kind), not serves)
             if soup != NOWHERE:
                 return soup
     room = free_counter(spec, state, reach, costs, seat, True) != NOWHERE
@@ -286,12 +282,12 @@ def _holding_ingredient(
     wanted: int,
 ) -> int:  # fmt: skip
     """Where a chef who holds an onion or a tomato should interact."""
-    held = state[CHEF * seat + HELD]
+    held = int(state[CHEF * seat + HELD])
     best = NOWHERE
     for cell in range(costs.size):
         if costs[cell] < 0 or _tile(spec, cell) != POT:
             continue
-        room = pot_room(state[CELLS + cell], wanted, held, spec[SPEC_ORDERS] == 0)
+        room = pot_room(int(state[CELLS + cell]), wanted, held, spec[SPEC_ORDERS] == 0)
         if room > 0 and (best == NOWHERE or costs[cell] < costs[best]):
             best = cell
     if best != NOWHERE:
@@ -310,11 +306,11 @@ def _holding_dish(
     best = NOWHERE
     soonest = 0
     for cell in range(costs.size):
-        packed = state[CELLS + cell]
         if costs[cell] < 0 or _tile(spec, cell) != POT:
             continue
-        if packed // POT_COUNT % POT_COUNT == INGREDIENTS_PER_SOUP:
-            soon = max(costs[cell], spec[SPEC_COOK_TIME] - packed // POT_TICKS)
+        packed = int(state[CELLS + cell])
+        if is_soup(packed):
+            soon = max(int(costs[cell]), ticks_left(spec, packed))
             if best == NOWHERE or soon < soonest:
                 best, soonest = cell, soon
     if best != NOWHERE:
@@ -329,10 +325,10 @@ def _holding_soup(
     spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], costs: NDArray[int16], seat: int
 ) -> int:
     """Where a chef who holds a soup should interact; a soup that is ordered later is put down until then."""
-    kind = state[CHEF * seat + HELD] - SOUP_OF_KIND
-    if spec[SPEC_ORDERS] > 0 and open_order(spec, state, 0) != kind:
-        for ahead in range(1, spec[SPEC_ORDERS]):
-            if open_order(spec, state, ahead) == kind:
+    held = state[CHEF * seat + HELD]
+    if spec[SPEC_ORDERS] > 0 and soup_of(open_order(spec, state, 0)) != held:
+        for later in range(1, spec[SPEC_ORDERS]):
+            if soup_of(open_order(spec, state, later)) == held:
                 return drop_at(spec, state, reach, costs, seat)
     serving = _nearest(spec, costs, SERVING)
     if serving != NOWHERE or not reaches_tile(spec, reach, 1 - seat, SERVING):
@@ -366,28 +362,19 @@ def _planned(
     goal = target(spec, all_costs, reach, state, seat)
     if goal == NOWHERE:
         return STAY
-    cell = state[CHEF * seat + CELL]
+    cell = int(state[CHEF * seat + CELL])
     cost = all_costs[cell * 4 + state[CHEF * seat + FACING], goal]
     if cost == 0:
-        packed = state[CELLS + goal]
-        cooks = packed // POT_COUNT % POT_COUNT == INGREDIENTS_PER_SOUP
-        if _tile(spec, goal) == POT and cooks and packed // POT_TICKS < spec[SPEC_COOK_TIME]:
+        packed = int(state[CELLS + goal])
+        if _tile(spec, goal) == POT and is_soup(packed) and ticks_left(spec, packed) > 0:
             return STAY
         return INTERACT
     for action in range(STAY):
-        ahead = _ahead(spec, cell, action)
-        ends = ahead if _tile(spec, ahead) == FLOOR else cell
+        there = ahead(cell, action, int(spec[SPEC_WIDTH]))
+        ends = there if _tile(spec, there) == FLOOR else cell
         if all_costs[ends * 4 + action, goal] == cost - 1:
             return action
     return STAY
-
-
-@lean_kernel
-def _ahead(spec: NDArray[int16], cell: int, facing: int) -> int:
-    width = spec[SPEC_WIDTH]
-    if facing < 2:
-        return int(cell - width if facing == 0 else cell + width)
-    return cell + 1 if facing == 2 else cell - 1
 
 
 @lean_kernel
@@ -406,27 +393,28 @@ def _in_the_way(spec: NDArray[int16], state: NDArray[int16], seat: int, memory: 
     asked = memory[OTHER_ACTION]
     if not memory[KNOWN] or asked >= STAY or other != memory[OTHER_CELL]:
         return False
-    return bool(_ahead(spec, other, asked) == state[CHEF * seat + CELL])
+    return bool(ahead(int(other), int(asked), int(spec[SPEC_WIDTH])) == state[CHEF * seat + CELL])
 
 
 @lean_kernel
 def wander(spec: NDArray[int16], state: NDArray[int16], seat: int, back: int, draw: float) -> int:
     """A random move to a free cell, `back` only if there is no other; NOWHERE if there is none."""
-    cell = state[CHEF * seat + CELL]
+    cell = int(state[CHEF * seat + CELL])
     other = state[CHEF * (1 - seat) + CELL]
+    width = int(spec[SPEC_WIDTH])
     free = 0
     back_is_free = False
     for move in range(STAY):
-        ahead = _ahead(spec, cell, move)
-        if _tile(spec, ahead) == FLOOR and ahead != other:
+        there = ahead(cell, move, width)
+        if _tile(spec, there) == FLOOR and there != other:
             free += move != back
             back_is_free = back_is_free or move == back
     if free == 0:
         return back if back_is_free else NOWHERE
     left = int(draw * free)
     for move in range(STAY):
-        ahead = _ahead(spec, cell, move)
-        if move != back and _tile(spec, ahead) == FLOOR and ahead != other:
+        there = ahead(cell, move, width)
+        if move != back and _tile(spec, there) == FLOOR and there != other:
             if left == 0:
                 return move
             left -= 1
@@ -459,7 +447,7 @@ def decide(
 def remember(
     state: NDArray[int16], seat: int, memory: NDArray[int16], own_action: int, other_action: int, draw: float
 ) -> None:
-    """Nothing; notes in `memory` what both did in `state`; `draw` in [0, 1): how long the stuck wander."""
+    """Note in `memory` what both did in `state`; `draw` in [0, 1): how long the stuck wander."""
     if stuck(state, seat, memory):
         memory[WANDERS] = int(draw * MOST_WANDERS)
     elif memory[WANDERS] > 0:

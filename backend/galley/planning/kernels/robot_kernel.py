@@ -17,17 +17,14 @@ from galley.kitchen.codes import (
     CELL,
     CELLS,
     CHEF,
+    DISH,
     FACING,
     HELD,
-    INGREDIENTS_PER_SOUP,
     INTERACT,
     NOTHING,
     ORDERS_DELIVERED,
     OUT_EVENTS,
     POT,
-    POT_COUNT,
-    POT_TICKS,
-    SPEC_COOK_TIME,
     SPEC_HEIGHT,
     SPEC_ORDERS,
     SPEC_POTS,
@@ -35,7 +32,8 @@ from galley.kitchen.codes import (
     SPEC_WIDTH,
     STAY,
 )
-from galley.kitchen.rules.classic import step
+from galley.kitchen.pots import amount_in, is_soup, ticks_left
+from galley.kitchen.rules.tick import step
 from galley.planning.kernels.joint_kernel import FAR, FREE, JointTables, joint_cost, joint_step
 from galley.planning.kernels.myopic_kernel import target, wander
 from galley.planning.kernels.subtask_kernel import (
@@ -128,9 +126,9 @@ def task_of(kind: int) -> int:
 def _stand_of(held: int) -> int:
     if held == NOTHING:
         return AT_POT
-    if held < 3:
+    if held < DISH:
         return WITH_INGREDIENT
-    return WITH_DISH if held == 3 else WITH_SOUP
+    return WITH_DISH if held == DISH else WITH_SOUP
 
 
 @lean_kernel
@@ -140,11 +138,11 @@ def world_of(spec: NDArray[int16], state: NDArray[int16], lying_soup: bool) -> i
     full = 1 if lying_soup else 0
     first = SPEC_TILES + spec[SPEC_WIDTH] * spec[SPEC_HEIGHT]
     for pot in range(spec[SPEC_POTS]):
-        inside = state[CELLS + spec[first + pot]] // POT_COUNT % POT_COUNT
-        if inside == INGREDIENTS_PER_SOUP:
+        packed = int(state[CELLS + spec[first + pot]])
+        if is_soup(packed):
             full += 1
         else:
-            count = max(count, inside)
+            count = max(count, amount_in(packed))
     orders = MOST_ORDERS
     if spec[SPEC_ORDERS] > 0:
         orders = min(MOST_ORDERS, max(1, spec[SPEC_ORDERS] - state[ORDERS_DELIVERED]))
@@ -168,10 +166,10 @@ def way_alone(brain: Brain, state: NDArray[int16], seat: int, cell: int) -> int:
 @lean_kernel
 def cooks_for(brain: Brain, state: NDArray[int16], cell: int) -> int:
     """The ticks until the soup in a full pot is ready; 0 for anything else."""
-    packed = state[CELLS + cell]
-    if brain.spec[SPEC_TILES + cell] != POT or packed // POT_COUNT % POT_COUNT < INGREDIENTS_PER_SOUP:
+    packed = int(state[CELLS + cell])
+    if brain.spec[SPEC_TILES + cell] != POT or not is_soup(packed):
         return 0
-    return int(brain.spec[SPEC_COOK_TIME] - packed // POT_TICKS)
+    return ticks_left(brain.spec, packed)
 
 
 @lean_kernel
@@ -201,9 +199,7 @@ def _cost_to_go(
     if cell >= 0 or human_cell >= 0:
         together = pair_cost(brain, state, seat, cell, human_cell)
         delay = min(own, alone) + CROWDED_TICKS if together >= FAR else together - max(own, alone)
-    if brain.pots[
-        1
-    ]:  # what must pass over counters is not in the value tables: the state machine's order decides
+    if brain.pots[1]:  # what must pass over counters is not in the value tables: a rank decides
         return float(own + delay + _rank(kind))
     at = world_of(brain.spec, state, kind == TAKE_SOUP or human == TAKE_SOUP)
     pots, unit = int(brain.pots[0]), brain.unit[0]
@@ -365,7 +361,7 @@ def robot_observe(
     brain: Brain, state: NDArray[int16], seat: int, memory: NDArray[int16], belief: NDArray[float64],
     action0: int, action1: int, after: NDArray[int16], out: NDArray[int32],
 ) -> None:  # fmt: skip
-    """Nothing; notes what both did in `state`, updates the belief; `after` int16[S] becomes the next state.
+    """Note what both did in `state` and update the belief; `after` int16[S] becomes the next state.
 
     The belief is uniform over the feasible subtasks when the human has done one. Otherwise each subtask's
     weight is multiplied by 1 + LEAST + the ticks by which the human's action shortened its way there.

@@ -19,19 +19,17 @@ from galley.kitchen.codes import (
     DISH_DISPENSER,
     FACING,
     HELD,
-    INGREDIENTS_PER_SOUP,
     NOTHING,
     ONION,
     ONION_DISPENSER,
     POT,
-    POT_COUNT,
     SERVING,
-    SOUP_OF_KIND,
     SPEC_ORDERS,
     SPEC_TILES,
     TOMATO,
     TOMATO_DISPENSER,
 )
+from galley.kitchen.pots import is_soup, soup_of
 from galley.planning.kernels.myopic_kernel import (
     drop_at,
     free_counter,
@@ -59,7 +57,7 @@ NEAREST = 3
 
 @lean_kernel
 def add_tile(out: NDArray[int16], kind: int, cell: int, costs: NDArray[int16]) -> None:
-    """Nothing; `cell` becomes one of the nearest tiles of a subtask if it is."""
+    """Make `cell` one of the nearest tiles of a subtask if it is."""
     if cell < 0 or costs[cell] < 0:
         return
     row = out[kind]
@@ -80,7 +78,7 @@ def add_sources(
     spec: NDArray[int16], state: NDArray[int16], reach: NDArray[bool_], costs: NDArray[int16], seat: int,
     thing: int, unshared: bool, kind: int, out: NDArray[int16],
 ) -> None:  # fmt: skip
-    """Nothing; adds where a thing is to be had; with `unshared`, not from counters the other chef reaches."""
+    """Add where a thing is to be had; with `unshared`, not from counters the other chef reaches."""
     dispenser = -1
     if thing == ONION:
         dispenser = ONION_DISPENSER
@@ -107,7 +105,7 @@ def _with_empty_hands(
     if serves or reaches_tile(spec, reach, other, SERVING):
         for kind in (ONION, TOMATO):
             if spec[SPEC_ORDERS] == 0 or open_order(spec, state, 0) == kind:
-                add_sources(spec, state, reach, costs, seat, kind + SOUP_OF_KIND, not serves, TAKE_SOUP, out)
+                add_sources(spec, state, reach, costs, seat, soup_of(kind), not serves, TAKE_SOUP, out)
     room = free_counter(spec, state, reach, costs, seat, True) >= 0
     on_its_way = state[CHEF * other + HELD] == DISH
     if need_of(spec, state, reach, seat, DISH, wanted, -1) > on_its_way:
@@ -127,14 +125,14 @@ def subtasks(
     spec: NDArray[int16], all_costs: NDArray[int16], reach: NDArray[bool_], state: NDArray[int16], seat: int,
     out: NDArray[int16],
 ) -> None:  # fmt: skip
-    """Nothing; fills `out` int16[KINDS, 4]: for each kind how many tiles, then up to 3 cells, nearest first.
+    """Fill `out` int16[KINDS, 4]: for each kind how many tiles, then up to 3 cells, nearest first.
 
     A kind without tiles is not feasible; to wait always is and has none.
     """
     out[:] = 0
     chef = CHEF * seat
     costs = all_costs[state[chef + CELL] * 4 + state[chef + FACING]]
-    held = state[chef + HELD]
+    held = int(state[chef + HELD])
     wanted = wanted_kind(spec, state, reach)
     if held == NOTHING:
         _with_empty_hands(spec, state, reach, costs, seat, wanted, out)
@@ -146,18 +144,18 @@ def subtasks(
         kind = DELIVER
     for cell in range(costs.size):
         tile = spec[SPEC_TILES + cell]
-        packed = state[CELLS + cell]
+        packed = int(state[CELLS + cell])
         if kind == DELIVER:
             fits = tile == SERVING
         elif kind == FETCH:
-            fits = tile == POT and packed // POT_COUNT % POT_COUNT == INGREDIENTS_PER_SOUP
+            fits = tile == POT and is_soup(packed)
         else:
             fits = tile == POT and pot_room(packed, wanted, held, spec[SPEC_ORDERS] == 0) > 0
         if fits:
             add_tile(out, kind, cell, costs)
-    if kind == DELIVER and spec[SPEC_ORDERS] > 0 and open_order(spec, state, 0) != held - SOUP_OF_KIND:
-        for ahead in range(1, spec[SPEC_ORDERS]):
-            if open_order(spec, state, ahead) == held - SOUP_OF_KIND:  # its turn comes later
+    if kind == DELIVER and spec[SPEC_ORDERS] > 0 and soup_of(open_order(spec, state, 0)) != held:
+        for later in range(1, spec[SPEC_ORDERS]):
+            if soup_of(open_order(spec, state, later)) == held:  # its turn comes
                 out[DELIVER, 0] = 0
     if out[kind, 0] > 0:
         return

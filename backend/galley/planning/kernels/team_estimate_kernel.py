@@ -18,14 +18,15 @@ from galley.kitchen.codes import (
     INGREDIENTS_PER_SOUP,
     NOTHING,
     ONION,
+    ONION_SOUP,
     POT,
-    POT_COUNT,
     SERVING,
-    SOUP_OF_KIND,
+    SPEC_COOK_TIMES,
     SPEC_ORDERS,
     SPEC_TILES,
     TOMATO,
 )
+from galley.kitchen.pots import amount_in, is_soup, soup_of, whole_soup
 from galley.planning.kernels.joint_kernel import FAR
 from galley.planning.kernels.myopic_kernel import open_order, pot_room, wanted_kind
 from galley.planning.kernels.robot_kernel import Brain, cooks_for, task_of, way_alone, world_of
@@ -55,7 +56,7 @@ STAGE_TICKS = 3.5
 def _pass_counters(
     brain: Brain, state: NDArray[int16], seat: int, out: NDArray[int16], summed: NDArray[int16]
 ) -> None:
-    """Nothing; adds the empty counters that both reach with the least way for both together."""
+    """Add the empty counters that both reach with the least way for both together."""
     chef = CHEF * seat
     other = CHEF * (1 - seat)
     own = brain.costs[4 * state[chef + CELL] + state[chef + FACING]]
@@ -73,7 +74,7 @@ def team_options(
     brain: Brain, state: NDArray[int16], seat: int, orders: int, thorough: bool, out: NDArray[int16],
     summed: NDArray[int16],
 ) -> None:  # fmt: skip
-    """Nothing; fills `out` int16[KINDS, 4] as `subtasks` does, with all that may help to `orders` more soups.
+    """Fill `out` int16[KINDS, 4] as `subtasks` does, with all that may help to `orders` more soups.
 
     A `thorough` search has more to try: dishes before a pot is begun, waiting beside a pot that is not full,
     both chefs after the last ingredient. In a narrow beam these crowd out better plans.
@@ -82,34 +83,33 @@ def team_options(
     spec, reach = brain.spec, brain.reach
     chef = CHEF * seat
     costs = brain.costs[4 * state[chef + CELL] + state[chef + FACING]]
-    held = state[chef + HELD]
+    held = int(state[chef + HELD])
     others = state[CHEF * (1 - seat) + HELD]
     wanted = wanted_kind(spec, state, reach)
     any_order = spec[SPEC_ORDERS] == 0
     soups = 0  # made or being made
     begun = 0
     dishes = int(others == DISH)
-    if others > SOUP_OF_KIND:
+    if others >= ONION_SOUP:
         soups += 1
     onion_room = 0
     tomato_room = 0
     for cell in range(costs.size):
         tile = spec[SPEC_TILES + cell]
-        packed = state[CELLS + cell]
+        packed = int(state[CELLS + cell])
         if tile == POT:
-            count = packed // POT_COUNT % POT_COUNT
-            soups += count == INGREDIENTS_PER_SOUP
-            begun += count > 0
-            if count == INGREDIENTS_PER_SOUP:
+            begun += packed > 0
+            if is_soup(packed):
+                soups += 1
                 packed = 0  # the next soup's ingredients may be taken ahead
             onion_room += pot_room(packed, wanted, ONION, any_order)
             tomato_room += pot_room(packed, wanted, TOMATO, any_order)
-        elif tile == COUNTER and packed > SOUP_OF_KIND:
+        elif tile == COUNTER and packed >= ONION_SOUP:
             soups += 1
     if held == NOTHING:
         for kind in (ONION, TOMATO):
             if any_order or open_order(spec, state, 0) == kind:
-                add_sources(spec, state, reach, costs, seat, kind + SOUP_OF_KIND, False, TAKE_SOUP, out)
+                add_sources(spec, state, reach, costs, seat, soup_of(kind), False, TAKE_SOUP, out)
         if (max(begun, 1) if thorough else begun) > dishes:
             add_sources(spec, state, reach, costs, seat, DISH, False, TAKE_DISH, out)
         for kind in (ONION, TOMATO):
@@ -122,16 +122,15 @@ def team_options(
         return
     for cell in range(costs.size):
         tile = spec[SPEC_TILES + cell]
-        packed = state[CELLS + cell]
+        packed = int(state[CELLS + cell])
         if held == DISH:
-            full = packed // POT_COUNT % POT_COUNT == INGREDIENTS_PER_SOUP
-            if tile == POT and (full or thorough):  # who is early waits beside it
+            if tile == POT and (is_soup(packed) or thorough):  # who is early waits beside it
                 add_tile(out, FETCH, cell, costs)
         elif held > DISH:
-            if tile == SERVING and (any_order or open_order(spec, state, 0) == held - SOUP_OF_KIND):
+            if tile == SERVING and (any_order or soup_of(open_order(spec, state, 0)) == held):
                 add_tile(out, DELIVER, cell, costs)
         elif tile == POT:
-            if packed // POT_COUNT % POT_COUNT == INGREDIENTS_PER_SOUP:
+            if is_soup(packed):
                 packed = 0  # who is early waits beside it
             if pot_room(packed, wanted, held, any_order) > 0:
                 add_tile(out, FILL, cell, costs)
@@ -156,7 +155,7 @@ def must_wait(brain: Brain, state: NDArray[int16], seat: int, cell: int) -> bool
     """Whether interacting with the tile does nothing yet: a soup still cooks, or a pot is still full."""
     if brain.spec[SPEC_TILES + cell] != POT:
         return False
-    full = state[CELLS + cell] // POT_COUNT % POT_COUNT == INGREDIENTS_PER_SOUP
+    full = is_soup(int(state[CELLS + cell]))
     if state[CHEF * seat + HELD] == DISH:
         return not full or cooks_for(brain, state, cell) > 0
     return bool(full)
@@ -176,17 +175,16 @@ def _stages(brain: Brain, state: NDArray[int16], orders: int) -> float:
     inside = 0
     for cell in range(brain.reach.shape[1]):
         tile = spec[SPEC_TILES + cell]
-        packed = state[CELLS + cell]
+        packed = int(state[CELLS + cell])
         if tile == POT:
-            count = packed // POT_COUNT % POT_COUNT
-            if count == INGREDIENTS_PER_SOUP:
+            if is_soup(packed):
                 in_pots += 1
                 cooking = max(cooking, cooks_for(brain, state, cell))
             else:
-                inside += count
+                inside += amount_in(packed)
         elif tile == COUNTER and packed != NOTHING:
             shared = brain.reach[0, cell] and brain.reach[1, cell]
-            if packed > SOUP_OF_KIND:
+            if packed >= ONION_SOUP:
                 soups += 1
                 stages += 2
             elif shared and packed == DISH:
@@ -199,7 +197,7 @@ def _stages(brain: Brain, state: NDArray[int16], orders: int) -> float:
     for seat in range(2):
         held = state[CHEF * seat + HELD]
         station = -1
-        if held > SOUP_OF_KIND:
+        if held >= ONION_SOUP:
             soups += 1
             stages += 1
             station = SERVING
@@ -226,7 +224,7 @@ def _stages(brain: Brain, state: NDArray[int16], orders: int) -> float:
     stages += plates  # to deliver what is then fetched
     last = float(cooking)
     if ingredients > 0:
-        last = float(spec[2]) + 2 * STAGE_TICKS
+        last = float(spec[SPEC_COOK_TIMES + whole_soup(ONION)]) + 2 * STAGE_TICKS
     return max(stages * STAGE_TICKS / 2 + near, last)
 
 

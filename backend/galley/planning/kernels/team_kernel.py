@@ -18,10 +18,12 @@ from galley.kitchen.codes import (
     DELIVERIES,
     INTERACT,
     OUT_EVENTS,
+    OUT_SIZE,
     STAY,
     TICK,
 )
-from galley.kitchen.rules.classic import finished, step
+from galley.kitchen.rules.shared import finished
+from galley.kitchen.rules.tick import step
 from galley.planning.kernels.joint_kernel import FAR, FREE, MOST_POSES, joint_cost, known_step
 from galley.planning.kernels.robot_kernel import Brain, pose_of, way_alone
 from galley.planning.kernels.subtask_kernel import (
@@ -171,7 +173,7 @@ def begin_search(
     search: Search, start: NDArray[int16], orders: int, beyond: int, pairs: int, thorough: bool,
     most_nodes: int,
 ) -> None:  # fmt: skip
-    """Nothing; makes ready for a plan for `orders` more soups from `start`.
+    """Make ready for a plan for `orders` more soups from `start`.
 
     With `beyond` more orders to follow the plan is the one after which those are likely to be served soonest.
     Of each node the `pairs` most promising pairs of subtasks are tried, in three ways each; the search ends
@@ -206,7 +208,7 @@ def search_on(brain: Brain, search: Search, work: int) -> bool:
     width = search.parents.size // ticks
     state = np.empty(search.states.shape[1], dtype=np.int16)
     leg = np.zeros((LEG_TICKS, 2), dtype=np.uint8)
-    out = np.zeros(4, dtype=np.int32)
+    out = np.zeros(OUT_SIZE, dtype=np.int32)
     options = np.zeros((2, KINDS, 4), dtype=np.int16)
     ahead = np.zeros((2, KINDS, 4), dtype=np.int16)
     summed = np.zeros(brain.reach.shape[1], dtype=np.int16)
@@ -258,7 +260,7 @@ def _expand(
     brain: Brain, search: Search, node: int, pick: NDArray[int64], state: NDArray[int16],
     leg: NDArray[uint8], out: NDArray[int32], ahead: NDArray[int16], summed: NDArray[int16],
 ) -> None:  # fmt: skip
-    """Nothing; adds the nodes to which a pair of subtasks, as in `_rate_pairs`, leads from a node."""
+    """Add the nodes to which a pair of subtasks, as in `_rate_pairs`, leads from a node."""
     ticks = search.counts.size
     tick = node // (search.parents.size // ticks)
     thorough = search.progress[THOROUGH] != 0

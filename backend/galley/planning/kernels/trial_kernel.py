@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from galley.compiled.kernels import kernel, lean_kernel
 from galley.compiled.randomness import draw
-from galley.kitchen.codes import INTERACT, TICK
-from galley.kitchen.rules.classic import finished, reset
+from galley.kitchen.codes import ACTIONS, CELLS, OUT_SIZE, TICK
+from galley.kitchen.rules.shared import finished, reset
 from galley.planning.kernels.myopic_kernel import MEMORY_SIZE, decide, remember
 from galley.planning.kernels.robot_kernel import ROBOT_MEMORY, Brain, robot_action, robot_observe
 from galley.planning.kernels.subtask_kernel import KINDS
@@ -31,7 +31,7 @@ def _myopic(
 ) -> int:
     tick = state[TICK]
     if epsilon > 0 and draw(seed, seat, tick, NOISE) < epsilon:
-        return int(draw(seed, seat, tick, NOISY_ACTION) * (INTERACT + 1))
+        return int(draw(seed, seat, tick, NOISY_ACTION) * len(ACTIONS))
     random = draw(seed, seat, tick, UNSTUCK)
     return int(decide(brain.spec, brain.costs, brain.reach, state, seat, memory, random))
 
@@ -41,14 +41,14 @@ def run_trials(
     brain: Brain, robot: int, seat: int, epsilon: float, robot_epsilon: float, seeds: NDArray[uint64],
     joint_actions: NDArray[uint8], ticks: NDArray[int16],
 ) -> None:  # fmt: skip
-    """Nothing; plays one trial per seed (uint64[B]) with the robot on `seat`, a myopic human on the other.
+    """Play one trial per seed (uint64[B]) with the robot on `seat`, a myopic human on the other.
 
     Fills `joint_actions` uint8[B, T, 2] and `ticks` int16[B], the length of each.
     """
-    size = 9 + brain.joint.floor_of.size
+    size = CELLS + brain.joint.floor_of.size
     state = np.zeros(size, dtype=np.int16)
     after = np.zeros(size, dtype=np.int16)
-    out = np.zeros(4, dtype=np.int32)
+    out = np.zeros(OUT_SIZE, dtype=np.int32)
     human = 1 - seat
     for trial in range(seeds.size):
         seed = seeds[trial]

@@ -12,6 +12,7 @@ from typing import Any, Final
 
 from galley.kitchen import Layout
 from galley.kitchen.codes import INGREDIENTS_PER_SOUP, ONION_SOUP, THINGS, TOMATO_SOUP
+from galley.kitchen.pots import amount_in, onions_in, recipe_of_thing
 from galley.kitchen.state import ChefView, KitchenView, PotView, view
 from galley.records.export.columns import Field, Sheet
 from galley.records.reading.round_replay import Replayed
@@ -111,22 +112,24 @@ def _chef(chef: ChefView, cook_time: int) -> dict[str, Any]:
 
 def _thing(code: int, place: tuple[int, int], cook_time: int) -> dict[str, Any]:
     if code in (ONION_SOUP, TOMATO_SOUP):
-        kind = THINGS[code].removesuffix("_soup")
-        return _soup(kind, INGREDIENTS_PER_SOUP, cook_time, place, cook_time)
+        recipe = recipe_of_thing(code)
+        onions = onions_in(recipe)
+        return _soup(onions, amount_in(recipe) - onions, cook_time, place, cook_time)
     return {"name": THINGS[code], "position": list(place)}
 
 
 def _pot(pot: PotView, place: tuple[int, int], cook_time: int) -> dict[str, Any]:
     full = pot.count == INGREDIENTS_PER_SOUP
-    return _soup(THINGS[pot.kind], pot.count, pot.ticks if full else -1, place, cook_time)
+    return _soup(pot.onions, pot.tomatoes, pot.ticks if full else -1, place, cook_time)
 
 
-def _soup(kind: str, count: int, ticks: int, place: tuple[int, int], cook_time: int) -> dict[str, Any]:
+def _soup(onions: int, tomatoes: int, ticks: int, place: tuple[int, int], cook_time: int) -> dict[str, Any]:
     idle = ticks < 0
+    names = ["onion"] * onions + ["tomato"] * tomatoes
     return {
         "name": "soup",
         "position": list(place),
-        "_ingredients": [{"name": kind, "position": list(place)}] * count,
+        "_ingredients": [{"name": name, "position": list(place)} for name in names],
         "cooking_tick": ticks,
         "is_cooking": not idle and ticks < cook_time,
         "is_ready": ticks >= cook_time,
