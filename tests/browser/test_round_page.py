@@ -29,7 +29,7 @@ def page(browser: Browser) -> Iterator[Page]:
 def server(page: Page) -> Server:
     played = Server(page, PAGES)
     page.goto(f"{HOST}/round")
-    assert played.wait_for("hello")[0]["protocol"] == 1
+    assert played.wait_for("hello")[0]["protocol"] == 2
     played.say(KEYFRAME)
     return played
 

@@ -16,7 +16,7 @@ from galley.protocol import messages as wire
 
 ROOT = Path(__file__).parents[2]
 GOOD: dict[str, dict[str, Any]] = {
-    "hello": {"protocol": 1, "tab": "a1b2"},
+    "hello": {"protocol": 2, "tab": "a1b2"},
     "ready": {},
     "key": {"key": "left", "down": True, "seq": 3, "client_ms": 12.5},
     "release": {"reason": "blur", "seq": 4, "client_ms": 13},

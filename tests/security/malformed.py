@@ -37,7 +37,7 @@ RAW = (
     *('{"a":' * 150 + "1" + "}" * 150, "9" * 1000, "\0" * 10, "x" * (MAX_MESSAGE_CHARS + 1), "é" * 700),
 )
 GOOD = {
-    "hello": {"protocol": 1, "tab": "again"},
+    "hello": {"protocol": 2, "tab": "again"},
     "ready": {},
     "key": {"key": "up", "down": True, "seq": 0, "client_ms": 1.0},
     "release": {"reason": "blur", "seq": 0, "client_ms": 1.0},

@@ -67,7 +67,7 @@ def _send(player: Player, seed: int) -> None:
         return
 
 
-@pytest.mark.parametrize("first", [b"\x00", "x" * 1025, '{"type":"ready"}', '{"type":"hello","protocol":1}'])
+@pytest.mark.parametrize("first", [b"\x00", "x" * 1025, '{"type":"ready"}', '{"type":"hello","protocol":2}'])
 def test_nonsense_before_hello_is_refused(site: Site, first: str | bytes) -> None:
     one = site.at_the_round()
     with one.play() as player:

@@ -113,7 +113,7 @@ def test_nobody_moves_somebody_elses_visit(site: Site) -> None:
             headers={"referer": site.served.url + ada.path, "x-token": ada.token},
         )
     with bob.play() as player:
-        player.send("hello", protocol=1, tab="t")
+        player.send("hello", protocol=2, tab="t")
         assert player.closed_with() == 4002, "bob has no round to play"
     assert _standing(site.served.store, ada) == before
     with ada.play() as player:

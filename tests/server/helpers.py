@@ -196,7 +196,7 @@ class Player:
 
     def hello(self) -> dict[str, Any]:
         """Say hello; the keyframe that answers."""
-        self.send("hello", protocol=1, tab=self.tab)
+        self.send("hello", protocol=2, tab=self.tab)
         return self.until("keyframe")
 
     def key(self, key: str, down: bool) -> None:

@@ -162,7 +162,7 @@ def test_bad_messages_are_refused_with_a_reason_and_the_round_goes_on(
             ("x" * 100_000, "at most 1024"),
             ('{"type":"fly"}', "type is one of"),
             ('{"type":"ready"}', "not waiting for ready"),
-            ('{"type":"hello","protocol":1,"tab":"x"}', "said already"),
+            ('{"type":"hello","protocol":2,"tab":"x"}', "said already"),
             ('{"type":"key","key":"up","down":true,"seq":0,"client_ms":1}', "does not come after"),
         ]
         for text, reason in bad:
@@ -226,7 +226,7 @@ def test_unknown_links_and_other_sites_get_no_socket(served: Served, person: Par
 def test_a_visit_at_another_step_has_no_round_to_play(served: Served) -> None:
     someone = Participant(served)
     with someone.play() as player:
-        player.send("hello", protocol=1, tab="x")
+        player.send("hello", protocol=2, tab="x")
         assert player.closed_with() == 4002
 
 

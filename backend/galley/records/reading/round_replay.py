@@ -17,7 +17,6 @@ from galley.kitchen import Layout
 from galley.kitchen.codes import DELIVERIES, ORDERS_DELIVERED, OUT_REWARD
 from galley.kitchen.events import Event
 from galley.kitchen.measures import Measures, measures_of
-from galley.kitchen.state import score_of
 from galley.kitchen.trajectory import HUMAN, NOBODY, Replay, Seat, Trajectory, episodes_of, play
 from galley.records.rows import RoundRow, SeatRow
 from galley.study.stages.round_step import ALONE_AGENT
@@ -155,7 +154,7 @@ def _wrong_end(row: RoundRow, episodes: Sequence[Replay]) -> list[str]:
     last = episodes[-1].states[-1]
     deliveries = sum(int(episode.states[-1, DELIVERIES]) for episode in episodes)
     found = (
-        ("score", row.score, sum(int(score_of(one.layout, one.states[-1])) for one in episodes)),
+        ("score", row.score, sum(one.score for one in episodes)),
         ("deliveries", row.deliveries, deliveries),
         ("hash of the last state", row.final_sha256, hashlib.sha256(state_bytes(last)).hexdigest()),
     )
