@@ -15,7 +15,7 @@ from websockets.frames import Frame, Opcode
 from tests.server.helpers import ONE_ROUND, Participant, Served, serving
 from tests.study.workspaces import study_workspace
 
-HELLO = b'{"type": "hello", "protocol": 1, "tab": "a"}'
+HELLO = b'{"type": "hello", "protocol": 2, "tab": "a"}'
 
 
 @pytest.fixture(scope="module")
