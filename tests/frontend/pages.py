@@ -115,9 +115,11 @@ def contexts(words: str = HOSTILE) -> dict[str, dict[str, Any]]:
 
 
 def _in_words(page: Mapping[str, Any], words: str) -> dict[str, Any]:
-    """What a page of its own kind is given, all words of it the same; hats are no words."""
+    """What a page of its own kind is given, all words of it the same; hats and addresses are no words."""
     return {
-        key: words if isinstance(value, str) and not key.endswith("hat") else value
+        key: words
+        if isinstance(value, str) and not key.endswith("hat") and not value.startswith("https://")
+        else value
         for key, value in page.items()
     }
 
