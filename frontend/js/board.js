@@ -3,11 +3,11 @@
  * No rules live here; the page shows what it is told.
  */
 
-/** @typedef {import("./wire.js").Keyframe} Keyframe */
-/** @typedef {import("./wire.js").Tick} Tick */
-/** @typedef {import("./wire.js").EventRow} EventRow */
-/** @typedef {import("./wire.js").Phase} Phase */
-/** @typedef {import("./wire.js").ChefRow} ChefRow */
+/** @typedef {import("./messages.js").Keyframe} Keyframe */
+/** @typedef {import("./messages.js").Tick} Tick */
+/** @typedef {import("./messages.js").EventRow} EventRow */
+/** @typedef {import("./messages.js").Phase} Phase */
+/** @typedef {import("./messages.js").ChefRow} ChefRow */
 
 /**
  * @typedef {object} Chef
@@ -47,7 +47,7 @@
  * @property {boolean} tutorial
  * @property {string[] | null} orders
  * @property {Effect[]} effects
- * @property {number | null} points of one soup
+ * @property {number} points of one soup
  * @property {number} episode
  * @property {number} episodes
  * @property {"during" | "after" | "never"} showScore
@@ -87,8 +87,8 @@ export function boardFrom(frame, you = "") {
       [cellKey(x, y), { onions, tomatoes, ticks, ready: Boolean(ready), at: NEVER }])),
     score: frame.score, scoredAt: NEVER, goal: frame.goal, round: frame.round, of: frame.of,
     tutorial: frame.tutorial, orders: frame.orders, effects: [],
-    points: frame.points ?? null, episode: frame.episode ?? 1, episodes: frame.episodes ?? 1,
-    showScore: frame.show_score ?? "during", you, alone: frame.partner === "none",
+    points: frame.points, episode: frame.episode, episodes: frame.episodes,
+    showScore: frame.show_score, you, alone: frame.partner === "none",
   };
 }
 

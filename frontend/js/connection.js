@@ -1,9 +1,9 @@
 /** The socket of a round: says hello, comes back by itself when it is lost, relates the two clocks. */
 
-import { CLOSE, hello, parse, ping } from "./wire.js";
+import { CLOSE, hello, parse, ping } from "./messages.js";
 
-/** @typedef {import("./wire.js").ClientMessage} ClientMessage */
-/** @typedef {import("./wire.js").ServerMessage} ServerMessage */
+/** @typedef {import("./messages.js").ClientMessage} ClientMessage */
+/** @typedef {import("./messages.js").ServerMessage} ServerMessage */
 /** @typedef {"connecting" | "open" | "lost" | "elsewhere" | "over" | "refused"} Link */
 
 const FIRST_WAIT_MS = 250;

@@ -3,7 +3,7 @@
 import { clock, fill } from "./words.js";
 
 /** @typedef {import("./board.js").Board} Board */
-/** @typedef {import("./wire.js").Key} Key */
+/** @typedef {import("./messages.js").Key} Key */
 /** @typedef {import("./words.js").Say} Say */
 
 /**

@@ -1,7 +1,7 @@
 /** The participant's keys: arrows or WASD, space or enter, and buttons on the glass for fingers. */
 
-/** @typedef {import("./wire.js").Key} Key */
-/** @typedef {import("./wire.js").ReleaseReason} ReleaseReason */
+/** @typedef {import("./messages.js").Key} Key */
+/** @typedef {import("./messages.js").ReleaseReason} ReleaseReason */
 
 /** Keys by place on the keyboard, so that WASD lies under the fingers on every national layout. */
 const CODES = Object.freeze(/** @type {Record<string, Key>} */ ({

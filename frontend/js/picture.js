@@ -6,8 +6,8 @@ import { still } from "./kitchen.js";
 import { HATS, Sprites, loadImages, newCanvas } from "./sprites.js";
 import { tileFor } from "./view.js";
 
-/** @typedef {import("./wire.js").ChefRow} ChefRow */
-/** @typedef {import("./wire.js").PotRow} PotRow */
+/** @typedef {import("./messages.js").ChefRow} ChefRow */
+/** @typedef {import("./messages.js").PotRow} PotRow */
 
 const TALLEST_PX = 420;
 const LARGEST_TILE = 84;
@@ -57,6 +57,7 @@ function redraw(figure, images) {
   draw(context, boardFrom({
     type: "keyframe", phase: "waiting", tick: 99, horizon: 99, tick_ms: 150, seat: 0, hats, grid, cook_time: 20, chefs,
     things: [], pots, score: 0, goal: null, round: 1, of: 1, tutorial: false, orders: null,
+    episode: 1, episodes: 1, partner: "agent", input_mode: "hold", show_score: "during", points: 20,
   }, document.body.dataset.you ?? ""), sprites, kitchen, 0);
   canvas.className = "kitchen-canvas";
   canvas.setAttribute("role", "img");

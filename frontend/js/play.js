@@ -7,13 +7,13 @@ import { Keys } from "./keys.js";
 import { Sounds } from "./sound.js";
 import { loadImages } from "./sprites.js";
 import { View } from "./view.js";
-import { key, ready, release } from "./wire.js";
+import { key, ready, release } from "./messages.js";
 import { wordsOf } from "./words.js";
 
 /** @typedef {import("./board.js").Board} Board */
 /** @typedef {import("./connection.js").Link} Link */
-/** @typedef {import("./wire.js").Keyframe} Keyframe */
-/** @typedef {import("./wire.js").ServerMessage} ServerMessage */
+/** @typedef {import("./messages.js").Keyframe} Keyframe */
+/** @typedef {import("./messages.js").ServerMessage} ServerMessage */
 /** @typedef {import("./words.js").Say} Say */
 
 const END_CARD_MS = 1300;
@@ -90,7 +90,7 @@ class Round {
     } else this.hud.hide();
   }
 
-  /** @param {import("./wire.js").Tick} message */
+  /** @param {import("./messages.js").Tick} message */
   step(message) {
     const board = this.board;
     if (!board) return;

@@ -1,4 +1,4 @@
-"""What the wire lets in, and that its table, its classes and its docs agree."""
+"""What is let in, and that its table, its classes and its docs agree."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from galley.protocol import messages as wire
+from galley.protocol import codec, messages
 
 ROOT = Path(__file__).parents[2]
 GOOD: dict[str, dict[str, Any]] = {
@@ -30,16 +30,16 @@ def frame(kind: str, **changes: Any) -> str:
 
 @pytest.mark.parametrize("kind", GOOD)
 def test_every_message_of_the_browser_is_understood(kind: str) -> None:
-    message = wire.parse(frame(kind))
+    message = codec.parse(frame(kind))
     assert type(message).__name__.lower() == kind
     assert dataclasses.asdict(message) == GOOD[kind]
 
 
 def test_the_table_names_the_fields_of_the_classes() -> None:
-    for name, message in wire.CLIENT.items():
-        parsed = wire.parse(frame(name))
+    for name, message in messages.CLIENT.items():
+        parsed = codec.parse(frame(name))
         assert [field.name for field in dataclasses.fields(parsed)] == [f.name for f in message.fields]
-    assert set(wire.CLIENT) == set(GOOD)
+    assert set(messages.CLIENT) == set(GOOD)
 
 
 @pytest.mark.parametrize(
@@ -75,14 +75,14 @@ def test_the_table_names_the_fields_of_the_classes() -> None:
     ],
 )
 def test_what_is_no_message_is_refused_with_the_reason(text: str | bytes, reason: str) -> None:
-    with pytest.raises(wire.MessageError, match=reason.replace("[", r"\[")):
-        wire.parse(text)
+    with pytest.raises(codec.MessageError, match=reason.replace("[", r"\[")):
+        codec.parse(text)
 
 
 @given(st.text(max_size=200) | st.binary(max_size=50))
 def test_no_text_does_anything_but_be_refused(text: str | bytes) -> None:
-    with pytest.raises(wire.MessageError):
-        wire.parse(text)
+    with pytest.raises(codec.MessageError):
+        codec.parse(text)
 
 
 JSON = st.recursive(
@@ -96,17 +96,49 @@ JSON = st.recursive(
 def test_a_message_with_any_field_replaced_is_understood_or_refused(kind: str, data: st.DataObject) -> None:
     fields = {"type": kind, **GOOD[kind]}
     fields[data.draw(st.sampled_from(sorted(fields)))] = data.draw(JSON)
-    with suppress(wire.MessageError):
-        assert isinstance(wire.parse(json.dumps(fields)), wire.Incoming)
+    with suppress(codec.MessageError):
+        assert isinstance(codec.parse(json.dumps(fields)), messages.Incoming)
 
 
 def test_encode_gives_one_json_object_with_its_type() -> None:
-    assert json.loads(wire.encode("countdown", seconds=3)) == {"type": "countdown", "seconds": 3}
+    countdown: messages.Countdown = {"type": "countdown", "seconds": 3}
+    assert json.loads(codec.encode(countdown)) == {"type": "countdown", "seconds": 3}
+    assert codec.parse_outgoing(codec.encode(countdown)) == countdown
+
+
+CHEF = [1, 1, 0, 0]
+TICK = {"type": "tick", "tick": 1, "chefs": [CHEF, CHEF], "things": [], "pots": [], "score": 0, "events": []}
+
+
+@pytest.mark.parametrize(
+    ("message", "reason"),
+    [
+        ({"type": "countdown", "seconds": -1}, "seconds is a whole number"),
+        ({"type": "countdown"}, "countdown lacks seconds"),
+        ({"type": "countdown", "seconds": 1, "more": 1}, "fields it should not have"),
+        ({"type": "ready"}, "type is one of keyframe"),
+        ({"type": "ended", "outcome": "won", "score": 1, "next": "/v/x"}, "outcome is one of finished"),
+        ({**TICK, "chefs": [CHEF]}, "chefs is a list of two chefs"),
+        ({**TICK, "things": [[1, 2]]}, "things is a list of things"),
+        ({**TICK, "pots": [[1, 2, 3, 4, 5, 1]]}, "pots is a list of pots"),
+        ({**TICK, "events": [["delivery", 2, 4, "serving", 1, 1]]}, "events is a list of events"),
+    ],
+)
+def test_what_the_server_should_not_say_is_found(message: dict[str, Any], reason: str) -> None:
+    assert codec.parse_outgoing(json.dumps(TICK)) == TICK
+    with pytest.raises(codec.MessageError, match=reason):
+        codec.parse_outgoing(json.dumps(message))
+
+
+@pytest.mark.parametrize("kind", GOOD)
+def test_browsers_made_of_code_say_what_is_understood(kind: str) -> None:
+    message = codec.parse(frame(kind))
+    assert codec.parse(codec.encode_incoming(message)) == message
 
 
 def test_the_protocol_page_holds_the_table_as_it_is() -> None:
     page = (ROOT / "docs" / "protocol.md").read_text(encoding="utf-8")
-    assert wire.tables() in page, "write galley.protocol.messages.tables() into docs/protocol.md"
-    assert f"version {wire.PROTOCOL}" in page
-    for code in (wire.CLOSE_REPLACED, wire.CLOSE_ENDED, wire.CLOSE_REFUSED):
+    assert messages.tables() in page, "write galley.protocol.messages.tables() into docs/protocol.md"
+    assert f"version {messages.PROTOCOL}" in page
+    for code in (messages.CLOSE_REPLACED, messages.CLOSE_ENDED, messages.CLOSE_REFUSED):
         assert f"`{code}`" in page

@@ -82,8 +82,8 @@ class Served:
 def serving(
     workspace: Workspace, database: Path | str, *, preview: bool = False, **settings: Any
 ) -> Iterator[Served]:
-    """A server for a workspace on a free port, until the block ends."""
-    chosen = Settings(port=0, **settings)
+    """A server for a workspace on a free port, until the block ends; it checks what it says."""
+    chosen = Settings(**{"port": 0, "debug": 1, **settings})
     with Store.open(database, serving=True) as store:
         app = create_app(load_content(workspace, chosen.study), store, chosen, preview=preview)
         listening = listen(chosen)

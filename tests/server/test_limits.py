@@ -12,7 +12,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from galley.protocol import messages as wire
+from galley.protocol import messages
 from galley.records.store.arrivals import slots
 from galley.server.limits import MOST_KEPT, Pace, Paces, network_of
 from galley.server.researcher import login_throttle
@@ -107,7 +107,7 @@ def test_a4_a_visit_has_few_sockets(served: Served) -> None:
         for one in idle[: -(MOST_SOCKETS - 1)]:
             with pytest.raises(ConnectionClosed):
                 one.recv(timeout=5)
-            closed += one.close_code == wire.CLOSE_REPLACED
+            closed += one.close_code == messages.CLOSE_REPLACED
         assert closed == SOCKETS_AT_ONCE - 1 - (MOST_SOCKETS - 1)
         with pytest.raises(TimeoutError):
             idle[-1].recv(timeout=0.2)

@@ -13,23 +13,18 @@ from galley.agents.scripted import Random
 from galley.kitchen import Kitchen, Layout
 from galley.kitchen.codes import DELIVERIES
 from galley.planning.myopic import Myopic
-from galley.protocol.scene import Scene, happenings
+from galley.protocol.keyframes import RoundView
+from galley.protocol.keyframes import keyframe as whole_kitchen
+from galley.protocol.scene import Scene, event_rows
 from galley.simulate.seen import KEY_OF, Seen
 
 RING = Layout.from_ascii("ring", "XXPXX\nO1 2O\nX   X\nXDXSX", cook_time_ticks=5, horizon_ticks=300)
 
 
 def keyframe(kitchen: Kitchen, seat: int) -> dict[str, Any]:
-    scene = Scene(kitchen.layout)
-    rules = kitchen.layout.rules
-    return {
-        **scene.whole(kitchen.state),
-        "tick": kitchen.tick,
-        "horizon": rules.horizon_ticks,
-        "cook_time": rules.cook_time_ticks,
-        "seat": seat,
-        "grid": scene.grid,
-    }
+    view = RoundView(150, 1, 1, False, None, 1, seat, ("blue", "orange"))
+    scene, tick = Scene(kitchen.layout), kitchen.tick
+    return dict(whole_kitchen(scene, view, kitchen.state, phase="playing", tick=tick, episode=1))
 
 
 @pytest.mark.parametrize("orders", [None, ("onion", "onion", "onion")])
@@ -53,7 +48,7 @@ def test_every_state_is_rebuilt(orders: tuple[str, ...] | None) -> None:
         frame = {
             "tick": kitchen.tick,
             **scene.changes(before, kitchen.state),
-            "events": happenings(kitchen.events),
+            "events": event_rows(kitchen.events),
         }
         seen.see(json.loads(json.dumps(frame)))
         expected = kitchen.state.copy()

@@ -25,8 +25,12 @@ def serve(
         typer.Option(min=0, max=65535, help="Port to listen on; 0 takes a free one.", show_default="8000"),
     ] = None,
     database: DatabaseOption = None,
+    debug: Annotated[
+        bool | None,
+        typer.Option("--debug", help="Check every message to a browser against the protocol's table."),
+    ] = None,
 ) -> None:
     """Serve the studies of a workspace and print where they are to be found."""
     from galley.server.run import serve as run
 
-    run(workspace, study=study, host=host, port=port, database=database)
+    run(workspace, study=study, host=host, port=port, database=database, debug=debug)

@@ -1,357 +1,262 @@
-"""The messages between browser and round: one table that parsing, docs/protocol.md and the tests read."""
+"""The messages between browser and round: a type for each, from which the table is made that all else reads.
+
+A field says its kind (galley.protocol.kinds) and what it means. docs/protocol.md, the checks of both
+directions, the simulated participant and the tests of the browser's own copy go by this table.
+"""
 
 from __future__ import annotations
 
-import math
-import re
-from collections.abc import Callable, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, Final, Literal, TypedDict, get_type_hints
 
-import orjson
+from galley.protocol.kinds import (
+    CHOICES,
+    Chefs,
+    Events,
+    Hats,
+    InputMode,
+    KeyName,
+    Number,
+    NumberOrNull,
+    Outcome,
+    Partner,
+    Phase,
+    Pots,
+    ReleaseReason,
+    Seat,
+    ShortText,
+    ShowScore,
+    Text,
+    Texts,
+    TextsOrNull,
+    Things,
+    Truth,
+    Whole,
+    WholeOrNull,
+)
 
-from galley.outcomes import ROUND_OUTCOMES
+PROTOCOL: Final = 2
+MAX_MESSAGE_CHARS: Final = 1024
 
-PROTOCOL = 2
-MAX_MESSAGE_CHARS = 1024
-KEYS = ("up", "down", "left", "right", "interact")
-RELEASE_REASONS = ("blur", "hidden", "shown", "pagehide")
-PHASES = ("waiting", "countdown", "playing", "paused", "ended")
-OUTCOMES = (*ROUND_OUTCOMES, "partner_left")
-SHOW_SCORE = ("during", "after", "never")
-INPUT_MODES = ("hold", "press")
-PARTNERS = ("agent", "human", "none")
-CLOSE_REPLACED = 4001
-CLOSE_ENDED = 4002
-CLOSE_REFUSED = 4003
-CLOSE_BUSY = 1013  # RFC 6455 registry: try again later
-
-
-class MessageError(ValueError):
-    """A message from the browser that cannot be used; the text is the reason the sender is given."""
-
-
-def _whole(value: object) -> bool:
-    return type(value) is int and 0 <= value < 2**53
-
-
-def _number(value: object) -> bool:
-    return type(value) in (int, float) and math.isfinite(value) and abs(value) < 1e15  # type: ignore[arg-type]
-
-
-def _one_of(*choices: str) -> Callable[[object], bool]:
-    return lambda value: isinstance(value, str) and value in choices
-
-
-def _list(value: object) -> bool:
-    return isinstance(value, list)
+CLOSE_REPLACED: Final = 4001
+CLOSE_ENDED: Final = 4002
+CLOSE_REFUSED: Final = 4003
+CLOSE_BUSY: Final = 1013
+"""RFC 6455 registry: try again later."""
 
 
-# Kinds of field: how the docs say them, and the check. A kind ending in "or null" also allows null.
-CHECKS: Mapping[str, Callable[[object], bool]] = {
-    "whole number": _whole,
-    "number": _number,
-    "true or false": lambda value: isinstance(value, bool),
-    "0 or 1": lambda value: type(value) is int and value in (0, 1),
-    "short text": lambda value: (
-        isinstance(value, str) and re.fullmatch(r"[\x20-\x7e]{1,64}", value) is not None
-    ),
-    "text": lambda value: isinstance(value, str),
-    "list": _list,
-    "key": _one_of(*KEYS),
-    "release reason": _one_of(*RELEASE_REASONS),
-    "phase": _one_of(*PHASES),
-    "outcome": _one_of(*OUTCOMES),
-    "score visibility": _one_of(*SHOW_SCORE),
-    "input mode": _one_of(*INPUT_MODES),
-    "partner": _one_of(*PARTNERS),
-}
-CHOICES: Mapping[str, tuple[str, ...]] = {
-    "key": KEYS,
-    "release reason": RELEASE_REASONS,
-    "phase": PHASES,
-    "outcome": OUTCOMES,
-    "score visibility": SHOW_SCORE,
-    "input mode": INPUT_MODES,
-    "partner": PARTNERS,
-}
+# ---- from the browser --------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Hello:
+    """The first message of a connection; answered with a keyframe."""
+
+    protocol: Annotated[Whole, f"version of this protocol, now {PROTOCOL}"]
+    tab: Annotated[ShortText, "a random name made at each page load: two tabs have two names"]
+
+
+@dataclass(frozen=True, slots=True)
+class Ready:
+    """The participant pressed Start, or is back after a pause: the countdown begins."""
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """A key went down or up. Repeats made by the keyboard are not sent."""
+
+    key: Annotated[KeyName, "which key"]
+    down: Annotated[Truth, "true when pressed, false when let go"]
+    seq: Annotated[Whole, "grows by one or more with every key and release message of a connection"]
+    client_ms: Annotated[Number, "the browser's clock when it happened, ms"]
+
+
+@dataclass(frozen=True, slots=True)
+class Release:
+    """The page lost the keyboard, or is in sight again after it was not: every held key counts as let go."""
+
+    reason: Annotated[ReleaseReason, "what happened to the page"]
+    seq: Annotated[Whole, "as in `key`"]
+    client_ms: Annotated[Number, "as in `key`"]
+
+
+@dataclass(frozen=True, slots=True)
+class Ping:
+    """Relates the two clocks; answered with a pong and stored with the round, at most once a second."""
+
+    client_ms: Annotated[Number, "the browser's clock when it was sent, ms"]
+    rtt_ms: Annotated[NumberOrNull, "round trip of the ping before, ms; null in the first"]
+
+
+Incoming = Hello | Ready | Key | Release | Ping
+
+
+# ---- from the server ---------------------------------------------------------------------------------
+
+
+class KitchenChanges(TypedDict):
+    """What of a tick the states around it decide."""
+
+    chefs: Annotated[Chefs, "seat 0 and seat 1 as [x, y, facing, held]"]
+    things: Annotated[Things, "counters that changed, as [x, y, thing]; thing 0 when now empty"]
+    pots: Annotated[Pots, "pots that changed, as [x, y, onions, tomatoes, ticks, ready]"]
+    score: Annotated[Whole, "points so far, of all episodes"]
+
+
+class WholeKitchen(TypedDict):
+    """What of a keyframe the state decides."""
+
+    chefs: Annotated[Chefs, "seat 0 and seat 1 as [x, y, facing, held]"]
+    things: Annotated[Things, "things lying on counters as [x, y, thing]"]
+    pots: Annotated[Pots, "every pot as [x, y, onions, tomatoes, ticks, ready]"]
+    score: Annotated[Whole, "points so far, of all episodes"]
+    orders: Annotated[TextsOrNull, "soups still ordered, first first; null when any soup is good"]
+
+
+class Keyframe(WholeKitchen):
+    """The whole kitchen: sent after hello, when a phase begins, and after a gap."""
+
+    type: Literal["keyframe"]
+    phase: Annotated[Phase, "where the round is"]
+    tick: Annotated[Whole, "ticks played of this episode"]
+    horizon: Annotated[Whole, "ticks of an episode"]
+    episode: Annotated[Whole, "number of the episode, from 1"]
+    episodes: Annotated[Whole, "episodes of the round"]
+    tick_ms: Annotated[Whole, "length of a tick, ms"]
+    seat: Annotated[Seat, "the participant's seat"]
+    hats: Annotated[Hats, "hat colours of seat 0 and seat 1, as this participant sees them"]
+    partner: Annotated[Partner, "who plays the other seat; none: nobody, and it is not drawn"]
+    input_mode: Annotated[InputMode, "whether a held direction repeats"]
+    show_score: Annotated[ShowScore, "when the score is shown"]
+    points: Annotated[Whole, "points of one soup"]
+    grid: Annotated[
+        Texts, "one text a row: X counter, P pot, O onions, T tomatoes, D dishes, S serving, space floor"
+    ]
+    cook_time: Annotated[Whole, "ticks a soup cooks"]
+    goal: Annotated[WholeOrNull, "points that earn the bonus"]
+    round: Annotated[Whole, "number of the round, 0 for a tutorial"]
+    of: Annotated[Whole, "rounds of the visit"]
+    tutorial: Annotated[Truth, "true when nothing counts"]
+
+
+class Countdown(TypedDict):
+    """Sent each second before play begins or goes on."""
+
+    type: Literal["countdown"]
+    seconds: Annotated[Whole, "seconds left"]
+
+
+class Tick(KitchenChanges):
+    """What one tick changed."""
+
+    type: Literal["tick"]
+    tick: Annotated[Whole, "ticks played of this episode, this one included"]
+    events: Annotated[Events, "what happened, as [kind, seat, thing, place, x, y]"]
+
+
+class Paused(TypedDict):
+    """The kitchen stands still; `ready` goes on with it, unless the reason is partner."""
+
+    type: Literal["paused"]
+    reason: Annotated[
+        Text,
+        "left (the page was closed, reloaded or lost its connection), restart (of the server), or "
+        "partner (the other participant is awaited)",
+    ]
+    seconds_left: Annotated[Whole, "seconds until the round is given up"]
+
+
+class Ended(TypedDict):
+    """The round is over and stored."""
+
+    type: Literal["ended"]
+    outcome: Annotated[
+        Outcome,
+        "finished: played to its end; abandoned: paused too long; skipped: left out; "
+        "partner_left: the other participant did not come back",
+    ]
+    score: Annotated[Whole, "points"]
+    next: Annotated[Text, "the page to go on to"]
+
+
+class Pong(TypedDict):
+    """Answers a ping."""
+
+    type: Literal["pong"]
+    client_ms: Annotated[Number, "as the ping said"]
+    server_ms: Annotated[Number, "the server's clock, ms since 1970"]
+
+
+class Elsewhere(TypedDict):
+    """The round was opened in another tab, which has it now; this connection closes."""
+
+    type: Literal["elsewhere"]
+
+
+class Refused(TypedDict):
+    """A message could not be used; the round goes on as if it had not been sent."""
+
+    type: Literal["refused"]
+    reason: Annotated[Text, "what was wrong with it"]
+
+
+Outgoing = Keyframe | Countdown | Tick | Paused | Ended | Pong | Elsewhere | Refused
+
+
+# ---- the table ---------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """One field of a message: name, kind (a key of CHECKS, perhaps with " or null") and what it says."""
+    """One field of a message: name, kind (one of galley.protocol.kinds) and what it says."""
 
     name: str
     kind: str
     about: str
 
-    def holds(self, value: object) -> bool:
-        """True when the value is of this field's kind."""
-        kind = self.kind.removesuffix(" or null")
-        if value is None:
-            return kind != self.kind
-        return CHECKS[kind](value)
-
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """One row of the protocol: who sends it, when, and its fields besides `type`."""
+    """One row of the protocol: its name and type, who sends it, when, and its fields besides `type`."""
 
     name: str
-    sender: str
+    kind: type
+    sender: Literal["client", "server"]
     about: str
-    fields: tuple[Field, ...] = ()
+    fields: tuple[Field, ...]
+
+
+def _fields(kind: type) -> Iterator[Field]:
+    """The fields of a message in the order of the docs: its own before those of the kitchen."""
+    hints: Mapping[str, Any] = get_type_hints(kind, include_extras=True)
+    parts = [set(part.__annotations__) for part in (WholeKitchen, KitchenChanges)]
+    of_kitchen = {name for part in parts if part <= hints.keys() for name in part}
+    for name in sorted(hints, key=lambda name: name in of_kitchen):
+        if name != "type":
+            field_kind, about = hints[name].__metadata__
+            yield Field(name, field_kind, about)
+
+
+def _rows(sender: Literal["client", "server"], *kinds: type) -> Iterator[Message]:
+    for kind in kinds:
+        yield Message(kind.__name__.lower(), kind, sender, str(kind.__doc__), tuple(_fields(kind)))
 
 
 MESSAGES: tuple[Message, ...] = (
-    Message(
-        "hello",
-        "client",
-        "The first message of a connection; answered with a keyframe.",
-        (
-            Field("protocol", "whole number", f"version of this protocol, now {PROTOCOL}"),
-            Field("tab", "short text", "a random name made at each page load: two tabs have two names"),
-        ),
-    ),
-    Message(
-        "ready", "client", "The participant pressed Start, or is back after a pause: the countdown begins."
-    ),
-    Message(
-        "key",
-        "client",
-        "A key went down or up. Repeats made by the keyboard are not sent.",
-        (
-            Field("key", "key", "which key"),
-            Field("down", "true or false", "true when pressed, false when let go"),
-            Field(
-                "seq",
-                "whole number",
-                "grows by one or more with every key and release message of a connection",
-            ),
-            Field("client_ms", "number", "the browser's clock when it happened, ms"),
-        ),
-    ),
-    Message(
-        "release",
-        "client",
-        "The page lost the keyboard, or is in sight again after it was not: every held key counts as let go.",
-        (
-            Field("reason", "release reason", "what happened to the page"),
-            Field("seq", "whole number", "as in `key`"),
-            Field("client_ms", "number", "as in `key`"),
-        ),
-    ),
-    Message(
-        "ping",
-        "client",
-        "Relates the two clocks; answered with a pong and stored with the round, at most once a second.",
-        (
-            Field("client_ms", "number", "the browser's clock when it was sent, ms"),
-            Field("rtt_ms", "number or null", "round trip of the ping before, ms; null in the first"),
-        ),
-    ),
-    Message(
-        "keyframe",
-        "server",
-        "The whole kitchen: sent after hello, when a phase begins, and after a gap.",
-        (
-            Field("phase", "phase", "where the round is"),
-            Field("tick", "whole number", "ticks played of this episode"),
-            Field("horizon", "whole number", "ticks of an episode"),
-            Field("episode", "whole number", "number of the episode, from 1"),
-            Field("episodes", "whole number", "episodes of the round"),
-            Field("tick_ms", "whole number", "length of a tick, ms"),
-            Field("seat", "0 or 1", "the participant's seat"),
-            Field("hats", "list", "hat colours of seat 0 and seat 1, as this participant sees them"),
-            Field("partner", "partner", "who plays the other seat; none: nobody, and it is not drawn"),
-            Field("input_mode", "input mode", "whether a held direction repeats"),
-            Field("show_score", "score visibility", "when the score is shown"),
-            Field("points", "whole number", "points of one soup"),
-            Field(
-                "grid",
-                "list",
-                "one text a row: X counter, P pot, O onions, T tomatoes, D dishes, S serving, space floor",
-            ),
-            Field("cook_time", "whole number", "ticks a soup cooks"),
-            Field("chefs", "list", "seat 0 and seat 1 as [x, y, facing, held]"),
-            Field("things", "list", "things lying on counters as [x, y, thing]"),
-            Field("pots", "list", "every pot as [x, y, onions, tomatoes, ticks, ready]"),
-            Field("score", "whole number", "points so far, of all episodes"),
-            Field("goal", "whole number or null", "points that earn the bonus"),
-            Field("round", "whole number", "number of the round, 0 for a tutorial"),
-            Field("of", "whole number", "rounds of the visit"),
-            Field("tutorial", "true or false", "true when nothing counts"),
-            Field("orders", "list or null", "soups still ordered, first first; null when any soup is good"),
-        ),
-    ),
-    Message(
-        "countdown",
-        "server",
-        "Sent each second before play begins or goes on.",
-        (Field("seconds", "whole number", "seconds left"),),
-    ),
-    Message(
-        "tick",
-        "server",
-        "What one tick changed.",
-        (
-            Field("tick", "whole number", "ticks played of this episode, this one included"),
-            Field("chefs", "list", "as in the keyframe"),
-            Field("things", "list", "counters that changed, as [x, y, thing]; thing 0 when now empty"),
-            Field("pots", "list", "pots that changed, as in the keyframe"),
-            Field("score", "whole number", "points so far, of all episodes"),
-            Field("events", "list", "what happened, as [kind, seat, thing, place, x, y]"),
-        ),
-    ),
-    Message(
-        "paused",
-        "server",
-        "The kitchen stands still; `ready` goes on with it, unless the reason is partner.",
-        (
-            Field(
-                "reason",
-                "text",
-                "left (the page was closed, reloaded or lost its connection), restart (of the server), or "
-                "partner (the other participant is awaited)",
-            ),
-            Field("seconds_left", "whole number", "seconds until the round is given up"),
-        ),
-    ),
-    Message(
-        "ended",
-        "server",
-        "The round is over and stored.",
-        (
-            Field(
-                "outcome",
-                "outcome",
-                "finished: played to its end; abandoned: paused too long; skipped: left out; "
-                "partner_left: the other participant did not come back",
-            ),
-            Field("score", "whole number", "points"),
-            Field("next", "text", "the page to go on to"),
-        ),
-    ),
-    Message(
-        "pong",
-        "server",
-        "Answers a ping.",
-        (
-            Field("client_ms", "number", "as the ping said"),
-            Field("server_ms", "number", "the server's clock, ms since 1970"),
-        ),
-    ),
-    Message(
-        "elsewhere",
-        "server",
-        "The round was opened in another tab, which has it now; this connection closes.",
-    ),
-    Message(
-        "refused",
-        "server",
-        "A message could not be used; the round goes on as if it had not been sent.",
-        (Field("reason", "text", "what was wrong with it"),),
-    ),
+    *_rows("client", Hello, Ready, Key, Release, Ping),
+    *_rows("server", Keyframe, Countdown, Tick, Paused, Ended, Pong, Elsewhere, Refused),
 )
-CLIENT: Mapping[str, Message] = {m.name: m for m in MESSAGES if m.sender == "client"}
-SERVER: Mapping[str, Message] = {m.name: m for m in MESSAGES if m.sender == "server"}
-
-
-@dataclass(frozen=True, slots=True)
-class Hello:
-    """The first message of a connection."""
-
-    protocol: int
-    tab: str
-
-
-@dataclass(frozen=True, slots=True)
-class Ready:
-    """The participant is ready to play."""
-
-
-@dataclass(frozen=True, slots=True)
-class Key:
-    """A key went down or up."""
-
-    key: str
-    down: bool
-    seq: int
-    client_ms: float
-
-
-@dataclass(frozen=True, slots=True)
-class Release:
-    """All keys count as let go."""
-
-    reason: str
-    seq: int
-    client_ms: float
-
-
-@dataclass(frozen=True, slots=True)
-class Ping:
-    """The browser's clock now, and the last round trip."""
-
-    client_ms: float
-    rtt_ms: float | None
-
-
-Incoming = Hello | Ready | Key | Release | Ping
-_CLASSES: Mapping[str, Callable[..., Incoming]] = {
-    "hello": Hello,
-    "ready": Ready,
-    "key": Key,
-    "release": Release,
-    "ping": Ping,
-}
-
-
-def parse(frame: str | bytes) -> Incoming:
-    """The message in one frame from a browser.
-
-    Raises: MessageError with the reason when it is none of the table's, or not as the table says.
-    """
-    if isinstance(frame, bytes):
-        raise MessageError("messages are text, not binary")
-    if len(frame) > MAX_MESSAGE_CHARS:
-        raise MessageError(f"messages have at most {MAX_MESSAGE_CHARS} characters, this one {len(frame)}")
-    try:
-        content = orjson.loads(frame)
-    except (orjson.JSONDecodeError, UnicodeEncodeError) as error:
-        raise MessageError("messages are JSON") from error
-    if not isinstance(content, dict):
-        raise MessageError("messages are JSON objects")
-    name = content.pop("type", None)
-    message = CLIENT.get(name) if isinstance(name, str) else None
-    if message is None:
-        raise MessageError(f"type is one of {', '.join(CLIENT)}")
-    for field in message.fields:
-        if field.name not in content:
-            raise MessageError(f"{message.name} lacks {field.name}")
-        if not field.holds(content[field.name]):
-            allowed = CHOICES.get(field.kind)
-            raise MessageError(
-                f"{field.name} is {'one of ' + ', '.join(allowed) if allowed else 'a ' + field.kind}"
-            )
-    if len(content) != len(message.fields):
-        raise MessageError(f"{message.name} has fields it should not have")
-    return _CLASSES[message.name](**content)
-
-
-def encode(name: str, **fields: Any) -> str:
-    """A server message as the text of its frame."""
-    return orjson.dumps({"type": name, **fields}).decode()
+CLIENT: Mapping[str, Message] = {row.name: row for row in MESSAGES if row.sender == "client"}
+SERVER: Mapping[str, Message] = {row.name: row for row in MESSAGES if row.sender == "server"}
 
 
 def tables() -> str:
     """The protocol's messages as Markdown, for docs/protocol.md."""
     lines: list[str] = []
-    for sender, title in (("client", "From the browser"), ("server", "From the server")):
+    for rows, title in ((CLIENT, "From the browser"), (SERVER, "From the server")):
         lines += [f"### {title}", ""]
-        for message in MESSAGES:
-            if message.sender != sender:
-                continue
+        for message in rows.values():
             lines += [f"#### `{message.name}`", "", message.about, ""]
             if message.fields:
                 lines += ["| field | kind | meaning |", "|---|---|---|"]

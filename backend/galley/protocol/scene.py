@@ -1,4 +1,4 @@
-"""What the browser is shown of a kitchen: its state and its changes as the lists that the wire carries."""
+"""What the browser is shown of a kitchen: its state and its changes as the lists that messages carry."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from galley.kitchen.codes import (
     ORDERS_DELIVERED,
 )
 from galley.kitchen.state import pot_view, score_of
+from galley.protocol.messages import KitchenChanges, WholeKitchen
 
 State = NDArray[int16]
 
@@ -37,7 +38,7 @@ class Scene:
         """Seat 0 and seat 1 as [x, y, facing, held]."""
         return self._chefs(state[: 2 * CHEF].tolist())
 
-    def whole(self, state: State, score_before: int = 0) -> dict[str, Any]:
+    def whole(self, state: State, score_before: int = 0) -> WholeKitchen:
         """The parts of a keyframe that the state decides, orders included.
 
         `score_before` are the points of earlier episodes.
@@ -53,7 +54,7 @@ class Scene:
             "orders": None if orders is None else list(orders[row[ORDERS_DELIVERED] :]),
         }
 
-    def changes(self, before: State, after: State, score_before: int = 0) -> dict[str, Any]:
+    def changes(self, before: State, after: State, score_before: int = 0) -> KitchenChanges:
         """The parts of a tick message that the states around it decide; `score_before` as in `whole`."""
         things: list[list[int]] = []
         pots: list[list[int | bool]] = []
@@ -79,6 +80,6 @@ class Scene:
         return [*self._places[cell], pot.onions, pot.tomatoes, pot.ticks, pot.ready]
 
 
-def happenings(events: Iterable[Event]) -> list[list[Any]]:
+def event_rows(events: Iterable[Event]) -> list[list[Any]]:
     """Events as [kind, seat, thing, place, x, y]."""
     return [[event.kind, event.seat, event.thing, event.place, event.x, event.y] for event in events]

@@ -66,7 +66,13 @@ def create_app(content: Content, store: Store, settings: Settings, *, preview: b
         settings.max_form_kib * 1024,
         settings.begins_per_min,
     )
-    play = Play(visits, matches, settings.messages_per_s, settings.address_messages_per_s)
+    play = Play(
+        visits,
+        matches,
+        settings.messages_per_s,
+        settings.address_messages_per_s,
+        debug=bool(settings.debug),
+    )
 
     time_limits = TimeLimits(store, studies, visits, matches, clock)
 

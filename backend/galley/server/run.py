@@ -39,6 +39,7 @@ def serve(
     host: str | None = None,
     port: int | None = None,
     database: str | None = None,
+    debug: bool | None = None,
     environ: Mapping[str, str] | None = None,
 ) -> None:
     """Serve a workspace until SIGINT or SIGTERM; prints its URL and each study's once it listens.
@@ -49,7 +50,12 @@ def serve(
         GalleyError: the port is taken, the database cannot be opened or served, or a study cannot be used.
     """
     settings = read_settings(
-        os.environ if environ is None else environ, study=study, host=host, port=port, database=database
+        os.environ if environ is None else environ,
+        study=study,
+        host=host,
+        port=port,
+        database=database,
+        debug=debug,
     )
     place = Workspace(workspace)
     _serve(place, settings, settings.database or place.database, preview=False)

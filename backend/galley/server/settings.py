@@ -71,6 +71,7 @@ class Settings:
     begins_per_min: int = _row(
         240, "BEGINS_PER_MIN", "Visits that one address may begin in a minute; 0 sets no limit.", 0, 1_000_000
     )
+    debug: int = _row(0, "DEBUG", "1 checks every message to a browser against the protocol's table.", 0, 1)
     log_level: str = _row("warning", "LOG_LEVEL", "How much is logged: error, warning, info or debug.")
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import time
 from collections import deque
 from collections.abc import Mapping
@@ -16,13 +15,21 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from galley.kitchen import Layout
+from galley.protocol.codec import MessageError, encode_incoming, parse_outgoing
+from galley.protocol.messages import (
+    CLOSE_ENDED,
+    CLOSE_REFUSED,
+    CLOSE_REPLACED,
+    PROTOCOL,
+    Hello,
+    Incoming,
+    Key,
+    Ping,
+    Ready,
+)
 from galley.simulate.results import Figures
 from galley.simulate.seen import MakeAgent, Seen
 
-CLOSE_REPLACED: Final = 4001
-CLOSE_ENDED: Final = 4002
-CLOSE_REFUSED: Final = 4003
-PROTOCOL: Final = 2
 PING_EVERY_S: Final = 1.0
 REACTION_OF_TICK: Final = (0.1, 0.4)
 """When in a tick a key is pressed, as shares of it."""
@@ -62,7 +69,9 @@ class Player:
     async def play(self) -> str:
         """How the round ended: its outcome, `left` when the participant left, `over` when it was over before.
 
-        Raises: RoundLost when the server cannot be reached again, or turns the participant away.
+        Raises:
+            RoundLost: the server cannot be reached again, turns the participant away, or says what the
+                protocol does not know.
         """
         waits = iter(RECONNECT_S)
         while True:
@@ -89,18 +98,18 @@ class Player:
             await asyncio.sleep(wait_s)
 
     async def _connected(self, socket: ClientConnection) -> int:
-        await _send(socket, type="hello", protocol=PROTOCOL, tab=f"simulated {self.rng.getrandbits(48):x}")
+        await _send(socket, Hello(PROTOCOL, f"simulated {self.rng.getrandbits(48):x}"))
         self._seq, self._tick_at_s = 0, None
         pinging = asyncio.create_task(self._ping(socket))
         thinking: asyncio.Task[None] | None = None
         try:
             async for text in socket:
-                frame = json.loads(text)
+                frame = _read(text)
                 ticked = self._frame(frame)
                 if frame["type"] == "ended":
                     self.outcome = str(frame["outcome"])
                 if frame["type"] == "keyframe" and self._phase in ("waiting", "paused"):
-                    await _send(socket, type="ready")
+                    await _send(socket, Ready())
                 if self.outcome:
                     break
                 if ticked and (thinking is None or thinking.done()):
@@ -121,7 +130,7 @@ class Player:
                 self._phase = frame["phase"]
                 self._tick_s = frame["tick_ms"] / 1000.0
                 self._tick_at_s = None
-                if self._seen is None or self._seen.episode != frame.get("episode", 1):
+                if self._seen is None or self._seen.episode != frame["episode"]:
                     self._seen = Seen(frame, self.make, self.layouts, self.rng.getrandbits(31))
                 else:
                     self._seen.look_again(frame)
@@ -181,16 +190,24 @@ class Player:
 
     async def _key(self, socket: ClientConnection, key: str, down: bool) -> None:
         seq, self._seq = self._seq, self._seq + 1
-        await _send(socket, type="key", key=key, down=down, seq=seq, client_ms=time.monotonic() * 1000.0)
+        await _send(socket, Key(key, down, seq, time.monotonic() * 1000.0))
 
     async def _ping(self, socket: ClientConnection) -> None:
         try:
             while True:
-                await _send(socket, type="ping", client_ms=time.monotonic() * 1000.0, rtt_ms=None)
+                await _send(socket, Ping(time.monotonic() * 1000.0, None))
                 await asyncio.sleep(PING_EVERY_S)
         except ConnectionClosed:
             return
 
 
-async def _send(socket: ClientConnection, **message: Any) -> None:
-    await socket.send(json.dumps(message, separators=(",", ":")))
+async def _send(socket: ClientConnection, message: Incoming) -> None:
+    await socket.send(encode_incoming(message))
+
+
+def _read(text: str | bytes) -> dict[str, Any]:
+    """A server's message, checked against the protocol's table."""
+    try:
+        return parse_outgoing(text)
+    except MessageError as error:
+        raise RoundLost(f"the server sent what the protocol does not know: {error}") from None

@@ -35,7 +35,7 @@ class Seen:
         self, keyframe: Mapping[str, Any], make: MakeAgent, layouts: Mapping[str, Layout], seed: int
     ) -> None:
         self.seat: int = keyframe["seat"]
-        self.episode: int = keyframe.get("episode", 1)
+        self.episode: int = keyframe["episode"]
         self.layout = _layout(keyframe, layouts)
         self._orders = self.layout.rules.orders or ()
         self._delivered = 0

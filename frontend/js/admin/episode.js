@@ -3,9 +3,9 @@
 import { NEVER, applyTick, boardFrom } from "../board.js";
 
 /** @typedef {import("../board.js").Board} Board */
-/** @typedef {import("../wire.js").Keyframe} Keyframe */
-/** @typedef {import("../wire.js").Tick} Tick */
-/** @typedef {import("../wire.js").EventRow} EventRow */
+/** @typedef {import("../messages.js").Keyframe} Keyframe */
+/** @typedef {import("../messages.js").Tick} Tick */
+/** @typedef {import("../messages.js").EventRow} EventRow */
 
 /** @typedef {Omit<Tick, "type" | "tick"> & {actions: [number, number], why: string | null}} Step one tick and both actions */
 /**

@@ -4,7 +4,7 @@ export const ACTIONS = /** @type {const} */ (["north", "south", "east", "west", 
 export const SIGNS = /** @type {const} */ (["↑", "↓", "→", "←", "·", "●"]);
 export const HELD = /** @type {const} */ (["nothing", "onion", "tomato", "dish", "onion soup", "tomato soup"]);
 
-/** @param {import("../wire.js").EventRow} event @returns {string} */
+/** @param {import("../messages.js").EventRow} event @returns {string} */
 export function eventWords([kind, , thing, place]) {
   const name = String(thing ?? "").replace("_", " ");
   switch (kind) {

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-import json
 from collections.abc import Callable, Coroutine, Sequence
 from typing import Any
 
 import numpy as np
 
 from galley.kitchen import EAST, Kitchen, Layout
-from galley.protocol import messages as wire
+from galley.protocol.codec import parse_outgoing
+from galley.protocol.messages import Key, Release
 from galley.records import ClockRow, KeyRow, Lease, PauseRow, TickRow
 from galley.server.clock import Clock
 from galley.server.rounds.match import Match
@@ -66,7 +66,7 @@ class Tab:
         self._slow_s = slow_s
 
     def send(self, text: str, handed: Handed | None = None) -> None:
-        self.messages.append(json.loads(text))
+        self.messages.append(parse_outgoing(text))
         if handed is not None:
             loop = asyncio.get_running_loop()
 
@@ -194,12 +194,12 @@ class Round:
     def key(self, name: str, down: bool, person: Person | None = None) -> None:
         self.seq += 1
         now = asyncio.get_running_loop().time()
-        self.match.key(person or self.person, wire.Key(name, down, self.seq, 1.0), now)
+        self.match.key(person or self.person, Key(name, down, self.seq, 1.0), now)
 
     def release(self, reason: str) -> None:
         self.seq += 1
         now = asyncio.get_running_loop().time()
-        self.match.release(self.person, wire.Release(reason, self.seq, 1.0), now)
+        self.match.release(self.person, Release(reason, self.seq, 1.0), now)
 
 
 def run(test: Coroutine[Any, Any, None]) -> None:

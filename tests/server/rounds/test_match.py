@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from galley.kitchen import EAST, INTERACT, NORTH, STAY, WEST
-from galley.protocol import messages as wire
+from galley.protocol import codec, kinds, messages
 from galley.server.clock import Stagger, first_deadline
 from galley.server.rounds.thinking import Answer
 from tests.server.rounds.live_round import TICK_S, Loop, Round, Tab, run, until_tick
@@ -142,7 +142,7 @@ def test_a_direction_held_in_the_countdown_acts_at_the_first_tick_and_a_tap_does
     async def test() -> None:
         round_ = Round(horizon=2)
         round_.join(Tab())
-        with pytest.raises(wire.MessageError, match="waiting"):
+        with pytest.raises(codec.MessageError, match="waiting"):
             round_.key("up", True)
         round_.ready()
         round_.key("interact", True)
@@ -236,7 +236,7 @@ def test_a_pause_that_is_too_long_abandons_the_round() -> None:
         back = Tab()
         round_.join(back)
         assert back.of("ended")[0]["outcome"] == "abandoned"
-        with pytest.raises(wire.MessageError, match="ended"):
+        with pytest.raises(codec.MessageError, match="ended"):
             round_.ready()
 
     run(test())
@@ -264,7 +264,7 @@ def test_the_newest_tab_wins_and_the_older_is_told() -> None:
         await until_tick(round_, 3)
         round_.join(new)
         assert old.messages[-1] == {"type": "elsewhere"}
-        assert old.closed == wire.CLOSE_REPLACED
+        assert old.closed == messages.CLOSE_REPLACED
         assert new.messages[0]["phase"] == "paused"
         round_.match.leave(old)
         assert round_.person.connection is new
@@ -283,7 +283,7 @@ def test_the_same_tab_coming_back_is_not_told_of_another() -> None:
         round_.join(dead)
         round_.join(alive)
         assert not dead.of("elsewhere")
-        assert dead.closed == wire.CLOSE_REPLACED
+        assert dead.closed == messages.CLOSE_REPLACED
 
     run(test())
 
@@ -293,10 +293,10 @@ def test_ready_out_of_turn_is_refused_and_changes_nothing() -> None:
         round_, tab = Round(horizon=5), Tab()
         round_.join(tab)
         round_.ready()
-        with pytest.raises(wire.MessageError, match="countdown"):
+        with pytest.raises(codec.MessageError, match="countdown"):
             round_.ready()
         await until_tick(round_, 2)
-        with pytest.raises(wire.MessageError, match="playing"):
+        with pytest.raises(codec.MessageError, match="playing"):
             round_.ready()
         await until_tick(round_, 5)
         await asyncio.sleep(1)
@@ -353,7 +353,7 @@ def test_a_round_that_cannot_be_closed_closes_the_page_and_is_not_said_to_have_e
         round_.ready()
         await until_tick(round_, 2)
         await asyncio.sleep(1)
-        assert tab.closed == wire.CLOSE_ENDED
+        assert tab.closed == messages.CLOSE_ENDED
         assert not tab.of("ended")
 
     run(test())
@@ -366,7 +366,7 @@ def test_pings_are_answered_and_kept_once_a_second() -> None:
         round_.join(tab)
         for number in range(30):
             round_.match.ping(
-                round_.person, wire.Ping(float(number), None), asyncio.get_running_loop().time()
+                round_.person, messages.Ping(float(number), None), asyncio.get_running_loop().time()
             )
             await asyncio.sleep(0.1)
         assert len(tab.of("pong")) == 30
@@ -383,19 +383,23 @@ def test_every_message_of_the_server_is_as_the_table_says() -> None:
         await until_tick(round_, 3)
         round_.key("right", True)
         await until_tick(round_, 9)
-        round_.match.ping(round_.person, wire.Ping(1.0, 2.0), 5.0)
+        round_.match.ping(round_.person, messages.Ping(1.0, 2.0), 5.0)
         round_.join(other)
         round_.ready()
         await until_tick(round_, 20)
         await asyncio.sleep(1)
         seen = set()
         for message in [*tab.messages, *other.messages]:
-            row = wire.SERVER[message.pop("type")]
+            row = messages.SERVER[message.pop("type")]
             seen.add(row.name)
             assert set(message) == {field.name for field in row.fields}
             for field in row.fields:
-                assert field.holds(message[field.name]), (row.name, field.name, message[field.name])
-        assert seen == set(wire.SERVER) - {"refused"}
+                assert kinds.holds(field.kind, message[field.name]), (
+                    row.name,
+                    field.name,
+                    message[field.name],
+                )
+        assert seen == set(messages.SERVER) - {"refused"}
 
     run(test())
 

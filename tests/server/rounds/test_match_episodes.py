@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from galley.kitchen import EAST, NORTH, STAY, WEST, Kitchen, Layout
-from galley.protocol import messages as wire
+from galley.protocol import messages
 from galley.records import Lease, LeaseLost
 from galley.server.rounds.match import MAX_ABSENCES
 from galley.server.rounds.takeover import caught_up
@@ -137,7 +137,7 @@ def test_a_round_that_another_server_took_over_stops_at_its_next_tick() -> None:
         await asyncio.sleep(5)
         assert round_.kitchen.tick == 4
         assert tab.messages[-1] == {"type": "elsewhere"}
-        assert tab.closed == wire.CLOSE_REPLACED
+        assert tab.closed == messages.CLOSE_REPLACED
         assert (round_.ends, round_.idle) == ([], [round_.match])
 
     run(test())
@@ -151,6 +151,6 @@ def test_a_round_that_was_taken_over_before_it_could_be_closed_is_not_said_to_ha
         await until_tick(round_, 2)
         await asyncio.sleep(1)
         assert not tab.of("ended")
-        assert tab.closed == wire.CLOSE_REPLACED
+        assert tab.closed == messages.CLOSE_REPLACED
 
     run(test())

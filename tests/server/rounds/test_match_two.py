@@ -7,7 +7,7 @@ import asyncio
 import pytest
 
 from galley.kitchen import EAST, NORTH, STAY
-from galley.protocol import messages as wire
+from galley.protocol import codec
 from tests.server.rounds.live_round import Round, Tab, run, until_tick
 
 
@@ -27,7 +27,7 @@ def test_two_people_play_once_both_are_ready_and_each_key_moves_its_own_chef() -
         one, two = Tab("one"), Tab("two")
         round_.match.join(round_.person, one)
         round_.match.ready(round_.person)
-        with pytest.raises(wire.MessageError, match="other participant"):
+        with pytest.raises(codec.MessageError, match="other participant"):
             round_.match.ready(round_.person)
         await asyncio.sleep(20)
         assert round_.match.phase == "waiting"
@@ -61,7 +61,7 @@ def test_a_pause_of_one_is_shown_to_both_and_only_who_left_presses_go_on() -> No
         back = Tab("two")
         round_.match.join(round_.other, back)
         assert back.messages[-1] == {"type": "paused", "reason": "left", "seconds_left": 50}
-        with pytest.raises(wire.MessageError):
+        with pytest.raises(codec.MessageError):
             round_.match.ready(round_.person)
         round_.match.ready(round_.other)
         await until_tick(round_, 20)

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from galley.kitchen.events import decode
-from galley.kitchen.trajectory import Replay, play
-from galley.protocol.scene import Scene, happenings
+from galley.kitchen.trajectory import play
+from galley.protocol.keyframes import RoundView, keyframe
+from galley.protocol.scene import Scene, event_rows
 from galley.records import RoundRow
 from galley.records.reading.round_replay import nobody, trajectories_of
 
@@ -23,14 +24,22 @@ def replay_document(row: RoundRow, ticks: Mapping[int, Mapping[str, Any]], after
     trajectories = trajectories_of(row)
     layout = trajectories[0].layout
     scene = Scene(layout)
-    hats = [seat.hat or NO_HAT for seat in row.seats]
-    human = next((seat.seat for seat in row.seats if seat.agent is None), 0)
+    view = _view(row)
     frames: list[dict[str, Any]] = []
     steps: list[dict[str, Any]] = []
     first, score = 0, 0
     for one in trajectories:
         replay = play(layout, one.joint_actions).to_its_end()
-        frames.append({"at": first, "board": _keyframe(row, scene, replay, hats, human, score)})
+        board = keyframe(
+            scene,
+            view,
+            replay.states[0],
+            phase="ended",
+            tick=0,
+            episode=len(frames) + 1,
+            score_before=score,
+        )
+        frames.append({"at": first, "board": board})
         for number in range(max(0, after - first), len(replay.out)):
             before, now, out = replay.states[number], replay.states[number + 1], replay.out[number]
             at = first + number
@@ -41,7 +50,7 @@ def replay_document(row: RoundRow, ticks: Mapping[int, Mapping[str, Any]], after
                     "why": _why(ticks.get(at)),
                     **changes,
                     "score": score + changes["score"],
-                    "events": happenings(decode(layout, before, now, out)),
+                    "events": event_rows(decode(layout, before, now, out)),
                 }
             )
         first += len(replay.out)
@@ -58,28 +67,22 @@ def replay_document(row: RoundRow, ticks: Mapping[int, Mapping[str, Any]], after
     }
 
 
-def _keyframe(
-    row: RoundRow, scene: Scene, replay: Replay, hats: list[str], human: int, score: int
-) -> dict[str, Any]:
-    whole = scene.whole(replay.states[0])
-    return {
-        "type": "keyframe",
-        "phase": "ended",
-        "tick": 0,
-        "horizon": row.horizon_ticks,
-        "tick_ms": row.tick_ms,
-        "seat": human,
-        "hats": hats,
-        "partner": "none" if any(map(nobody, row.seats)) else "agent",
-        "grid": scene.grid,
-        "cook_time": scene.layout.rules.cook_time_ticks,
-        "goal": None,
-        "round": row.round_no,
-        "of": row.round_no,
-        "tutorial": row.round_no == 0,
-        **whole,
-        "score": score,
-    }
+def _view(row: RoundRow) -> RoundView:
+    """The round as its first person saw it, though of the visit's other rounds nothing is known here."""
+    first, second = row.seats
+    human = next((seat.seat for seat in row.seats if seat.agent is None), 0)
+    agents = any(seat.agent is not None for seat in row.seats)
+    return RoundView(
+        tick_ms=row.tick_ms,
+        round_no=row.round_no,
+        of=row.round_no,
+        tutorial=row.round_no == 0,
+        goal=None,
+        episodes=row.episodes,
+        seat=human,
+        hats=(first.hat or NO_HAT, second.hat or NO_HAT),
+        partner="none" if any(map(nobody, row.seats)) else "agent" if agents else "human",
+    )
 
 
 def _why(tick: Mapping[str, Any] | None) -> str | None:

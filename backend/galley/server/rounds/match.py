@@ -6,18 +6,29 @@ import asyncio
 import logging
 import math
 from collections.abc import Iterable
-from typing import Any, Protocol
+from typing import Any
 
 from galley.kitchen import STAY
 from galley.outcomes import RoundOutcome
-from galley.protocol import messages as wire
-from galley.protocol.scene import Scene, happenings
+from galley.protocol.codec import MessageError, encode
+from galley.protocol.keyframes import keyframe
+from galley.protocol.messages import (
+    CLOSE_BUSY,
+    CLOSE_ENDED,
+    CLOSE_REPLACED,
+    Key,
+    Outgoing,
+    Ping,
+    Release,
+)
+from galley.protocol.scene import Scene, event_rows
 from galley.records import LeaseLost, PauseRow
 from galley.server.clock import Clock, first_deadline
 from galley.server.rounds.episodes import Course
+from galley.server.rounds.match_host import MatchHost
 from galley.server.rounds.person import Connection, Person
 from galley.server.rounds.round_journal import Handed, Played, RoundJournal
-from galley.server.rounds.round_spec import RoundSpec, picture
+from galley.server.rounds.round_spec import RoundSpec
 from galley.server.rounds.thinking import Mind, Question
 
 LOG = logging.getLogger(__name__)
@@ -26,22 +37,6 @@ RESTART = "restart"
 PARTNER = "partner"
 MAX_ABSENCES = 200
 """So many a person and round are recorded: each is a write of its own."""
-
-
-class Keeping(Protocol):
-    """What a match asks of whoever made it."""
-
-    async def finish(self, match: Match, outcome: RoundOutcome) -> None:
-        """Store the end; awaited once, before anybody is told."""
-
-    async def stand_in(self, match: Match, person: Person, agent: str) -> Mind:
-        """An agent made ready for the seat of somebody who left, once that is stored."""
-
-    def forget(self, match: Match) -> None:
-        """Let go of it: nobody came, or another process has it."""
-
-    def hidden(self, match: Match, person: Person, since_ms: float, until_ms: float | None) -> None:
-        """Note that a person's page is out of sight, or was."""
 
 
 class Match:
@@ -62,7 +57,7 @@ class Match:
         players: tuple[Person | Mind, Person | Mind],
         journal: RoundJournal,
         clock: Clock,
-        keeping: Keeping,
+        host: MatchHost,
         *,
         stagger: float,
     ) -> None:
@@ -75,7 +70,7 @@ class Match:
         self.left: tuple[Person, ...] = ()
         self.journal = journal
         self._clock = clock
-        self._keeping = keeping
+        self._host = host
         self._loop = asyncio.get_running_loop()
         self._tick_s = spec.tick_ms / 1000.0
         self._stagger = stagger
@@ -105,6 +100,11 @@ class Match:
         """The participants who still belong to the round."""
         return [player for player in self.players if isinstance(player, Person)]
 
+    @property
+    def under_way(self) -> bool:
+        """Whether the round is played: it ticks, or counts down to go on after its first tick."""
+        return self.phase == "playing" or (self.phase == "countdown" and self.course.ticks > 0)
+
     # ---- what the browsers do ------------------------------------------------------------------------------
 
     def join(self, person: Person, connection: Connection) -> None:
@@ -112,8 +112,8 @@ class Match:
         older = person.connection
         if older is not None:
             if older.tab != connection.tab:
-                older.send(wire.encode("elsewhere"))
-            older.close(wire.CLOSE_REPLACED)
+                older.send(encode({"type": "elsewhere"}))
+            older.close(CLOSE_REPLACED)
             self.leave(older)
         person.connection = connection
         if self.phase == "waiting":
@@ -128,7 +128,7 @@ class Match:
         person.connection = None
         was_ready, person.ready = person.ready, False
         self._in_sight(person)
-        if self.phase == "playing" or (self.phase == "countdown" and self.course.ticks > 0):
+        if self.under_way:
             self._stand_still(reason)
         elif self.phase in ("waiting", "countdown"):
             self._cancel_timer()
@@ -145,21 +145,35 @@ class Match:
         """Send a person the whole picture and what belongs to the phase."""
         if not person.here:
             return
-        whole = self.scene.whole(self._state, self.course.score_before)
-        person.send("keyframe", **picture(self.spec, self.scene, self.course, self.phase, person), **whole)
+        course = self.course
+        person.send(
+            keyframe(
+                self.scene,
+                self.spec.view(person, course.episodes),
+                self._state,
+                phase=self.phase,
+                tick=course.kitchen.tick,
+                episode=course.episode,
+                score_before=course.score_before,
+            )
+        )
         if self.phase == "paused" and self._pause is not None:
             left_s = max(0, math.ceil(self._give_up_at_s - self._loop.time()))
             reason = PARTNER if person.ready else self._pause.reason
-            person.send("paused", reason=reason, seconds_left=left_s)
+            person.send({"type": "paused", "reason": reason, "seconds_left": left_s})
         elif self._ending is not None and self._ending.done():
             self._say_ended(person)
 
     def ready(self, person: Person) -> None:
-        """Begin the countdown once all are ready. Raises: MessageError when it does not wait for that."""
+        """Begin the countdown once all are ready.
+
+        Raises:
+            MessageError: it does not wait for that.
+        """
         if self.phase not in ("waiting", "paused"):
-            raise wire.MessageError(f"the round is not waiting for ready: it is {self.phase}")
+            raise MessageError(f"the round is not waiting for ready: it is {self.phase}")
         if person.ready:
-            raise wire.MessageError("the round is waiting for the other participant")
+            raise MessageError("the round is waiting for the other participant")
         person.ready = True
         if all(one.ready for one in self.people):
             self._count_down()
@@ -168,10 +182,14 @@ class Match:
         else:
             self.show(person)
 
-    def key(self, person: Person, message: wire.Key, arrival_s: float) -> None:
-        """A key went down or up. Raises: MessageError when nothing is being played."""
+    def key(self, person: Person, message: Key, arrival_s: float) -> None:
+        """A key went down or up.
+
+        Raises:
+            MessageError: nothing is being played.
+        """
         if self.phase not in ("countdown", "playing"):
-            raise wire.MessageError(f"no key counts now: the round is {self.phase}")
+            raise MessageError(f"no key counts now: the round is {self.phase}")
         self._in_sight(person)
         if message.down:
             person.keys.press(message.key)
@@ -179,7 +197,7 @@ class Match:
             person.keys.let_go(message.key)
         self.journal.key(message, arrival_s, self.course.ticks, person.seat)
 
-    def release(self, person: Person, message: wire.Release, arrival_s: float) -> None:
+    def release(self, person: Person, message: Release, arrival_s: float) -> None:
         """All keys were let go; outside of play there is none to let go of."""
         if message.reason == "shown":
             self._in_sight(person)
@@ -187,19 +205,20 @@ class Match:
             if message.reason == "hidden" and person.hidden_ms is None and person.absences < MAX_ABSENCES:
                 person.absences += 1
                 person.hidden_ms = self._clock.ms(arrival_s)
-                self._keeping.hidden(self, person, person.hidden_ms, None)
+                self._host.hidden(self, person, person.hidden_ms, None)
             person.keys.let_go_all()
             self.journal.key(message, arrival_s, self.course.ticks, person.seat)
 
-    def ping(self, person: Person, message: wire.Ping, arrival_s: float) -> None:
+    def ping(self, person: Person, message: Ping, arrival_s: float) -> None:
         """Answer a ping and note it."""
-        person.send("pong", client_ms=message.client_ms, server_ms=self._clock.ms(arrival_s))
+        server_ms = self._clock.ms(arrival_s)
+        person.send({"type": "pong", "client_ms": message.client_ms, "server_ms": server_ms})
         if self.phase != "ended":
             self.journal.ping(message, arrival_s, person.seat)
 
     def _in_sight(self, person: Person) -> None:
         if person.hidden_ms is not None:
-            self._keeping.hidden(self, person, person.hidden_ms, self._clock.ms())
+            self._host.hidden(self, person, person.hidden_ms, self._clock.ms())
             person.hidden_ms = None
 
     # ---- the clock -----------------------------------------------------------------------------------------
@@ -218,7 +237,7 @@ class Match:
 
     def _count(self, seconds: int) -> None:
         if seconds > 0:
-            self._send_all("countdown", seconds=seconds)
+            self._send_all({"type": "countdown", "seconds": seconds})
             self._timer = self._loop.call_later(1.0, self._count, seconds - 1)
             return
         for person in self.people:
@@ -257,9 +276,14 @@ class Match:
         before = self._state
         course.step(*joint)
         after = self._state = course.kitchen.state.copy()
-        changes = self.scene.changes(before, after, course.score_before)
-        events = happenings(course.kitchen.events)
-        text = wire.encode("tick", tick=course.kitchen.tick, events=events, **changes)
+        text = encode(
+            {
+                "type": "tick",
+                "tick": course.kitchen.tick,
+                "events": event_rows(course.kitchen.events),
+                **self.scene.changes(before, after, course.score_before),
+            }
+        )
         handed = Handed()
         for person in people:
             if person.connection is not None:
@@ -328,17 +352,16 @@ class Match:
         elif self.phase == "paused" or any(person.ready for person in self.people):
             self._without([person for person in self.people if not person.ready])
         elif self.phase == "waiting" and not any(person.here for person in self.people):
-            self._keeping.forget(self)
+            self._host.forget(self)
 
     def drop_out(self, person: Person) -> None:
         """Go on without a person, who left for good."""
         if self.phase == "ended" or person not in self.people:
             return
         person.ready = False
-        if self.phase == "playing" or (self.phase == "countdown" and self.course.ticks > 0):
+        if self.under_way:
             self._stand_still(LEFT)
-        self._cancel_timer()
-        self._cancel_absence()
+        self._cancel_both()
         self._without([person], asked=True)
 
     def _without(self, absent: Iterable[Person], *, asked: bool = False) -> None:
@@ -356,7 +379,7 @@ class Match:
     async def _replace(self, person: Person, agent: str) -> None:
         """An agent takes the seat of a person, who leaves the round."""
         try:
-            mind = await self._keeping.stand_in(self, person, agent)
+            mind = await self._host.stand_in(self, person, agent)
         except Exception:  # whatever keeps the agent from coming, the other person must not wait for ever
             LOG.exception("round %d goes on with nobody", self.spec.round_id)
             self.left = (person,)
@@ -366,7 +389,7 @@ class Match:
             self._replacing = None
         if self.phase == "ended":
             return
-        person.close(wire.CLOSE_ENDED)
+        person.close(CLOSE_ENDED)
         self.players[person.seat] = mind
         self._ask(None)
         if all(one.ready and one.here for one in self.people):
@@ -385,8 +408,7 @@ class Match:
         """End the round, if it has not ended yet; `ended` tells when that is stored."""
         if self.phase == "ended":
             return
-        self._cancel_timer()
-        self._cancel_absence()
+        self._cancel_both()
         for person in self.people:
             self._in_sight(person)
         self.phase = "ended"
@@ -403,46 +425,47 @@ class Match:
         await asyncio.sleep(0.01)
         self.journal.write()
         try:
-            await self._keeping.finish(self, outcome)
+            await self._host.finish(self, outcome)
         except LeaseLost:
             self.lose()
             return
         except Exception:  # the round is in the journal; opening the page again tries to close it again
             LOG.exception("round %d could not be closed", self.spec.round_id)
             for person in self.people:
-                person.close(wire.CLOSE_ENDED)
+                person.close(CLOSE_ENDED)
             return
         for person in self.people:
             self._say_ended(person)
 
     def _say_ended(self, person: Person) -> None:
-        outcome = "partner_left" if self.left and person not in self.left else self.outcome
-        person.send("ended", outcome=outcome, score=self.course.score, next=person.next_url)
+        left = bool(self.left) and person not in self.left
+        outcome = "partner_left" if left else str(self.outcome)
+        person.send(
+            {"type": "ended", "outcome": outcome, "score": self.course.score, "next": person.next_url}
+        )
 
     def lose(self) -> None:
         """Stop: another process has the round now, and this one's people with it."""
-        self._cancel_timer()
-        self._cancel_absence()
+        self._cancel_both()
         self.phase = "ended"
         alone = len(self.people) == 1
         for person in self.people:
             if alone:
-                person.send("elsewhere")
-            person.close(wire.CLOSE_REPLACED if alone else wire.CLOSE_BUSY)
-        self._keeping.forget(self)
+                person.send({"type": "elsewhere"})
+            person.close(CLOSE_REPLACED if alone else CLOSE_BUSY)
+        self._host.forget(self)
 
     def stop(self) -> None:
         """Stop for a shutdown: what was played is journalled, a round in play is left paused."""
-        if self.phase == "playing" or (self.phase == "countdown" and self.course.ticks > 0):
+        if self.under_way:
             self._stand_still(RESTART)
-        self._cancel_timer()
-        self._cancel_absence()
+        self._cancel_both()
 
     # ---- small parts ---------------------------------------------------------------------------------------
 
-    def _send_all(self, name: str, **fields: Any) -> None:
+    def _send_all(self, message: Outgoing) -> None:
         for person in self.people:
-            person.send(name, **fields)
+            person.send(message)
 
     def _show_all(self) -> None:
         for person in self.people:
@@ -457,3 +480,7 @@ class Match:
         if self._absence is not None:
             self._absence.cancel()
             self._absence = None
+
+    def _cancel_both(self) -> None:
+        self._cancel_timer()
+        self._cancel_absence()

@@ -14,7 +14,7 @@ from weakref import WeakValueDictionary
 from galley.agents.catalogue import Catalogue
 from galley.kitchen import Layout
 from galley.outcomes import RoundOutcome
-from galley.protocol import messages as wire
+from galley.protocol.messages import CLOSE_ENDED
 from galley.records import Lease, NewRound, RoundRow, Store, VisitRow
 from galley.records.database import leases
 from galley.records.reading.round_replay import state_bytes
@@ -201,7 +201,7 @@ class Matches:
         for person in match.people:
             connection = person.connection
             if connection is not None:
-                connection.close(wire.CLOSE_ENDED)
+                connection.close(CLOSE_ENDED)
                 match.leave(connection)
         match.stop()
         await match.ended()

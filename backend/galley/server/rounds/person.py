@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Protocol
 
-from galley.protocol import messages as wire
+from galley.protocol.codec import encode
+from galley.protocol.messages import Outgoing
 from galley.server.rounds.key_state import KeyState
 from galley.server.rounds.round_journal import Handed
 
@@ -45,10 +46,10 @@ class Person:
         """Whether a browser is connected."""
         return self.connection is not None
 
-    def send(self, name: str, **fields: Any) -> None:
+    def send(self, message: Outgoing) -> None:
         """Send a message, if anybody is there to read it."""
         if self.connection is not None:
-            self.connection.send(wire.encode(name, **fields))
+            self.connection.send(encode(message))
 
     def close(self, code: int) -> None:
         """Close the connection, if there is one."""

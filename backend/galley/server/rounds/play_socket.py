@@ -5,13 +5,27 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import deque
+from enum import Enum
 
 from starlette.responses import Response
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from galley.protocol import messages as wire
+from galley.protocol.codec import MessageError, encode, parse, parse_outgoing
+from galley.protocol.messages import (
+    CLOSE_BUSY,
+    CLOSE_ENDED,
+    CLOSE_REFUSED,
+    CLOSE_REPLACED,
+    PROTOCOL,
+    Hello,
+    Incoming,
+    Key,
+    Ping,
+    Ready,
+    Release,
+)
 from galley.server.headers import same_origin
-from galley.server.limits import Paces, network_of
+from galley.server.limits import Pace, Paces, network_of
 from galley.server.participant.visits import Visits
 from galley.server.rounds.match import LEFT, RESTART
 from galley.server.rounds.matches import Matches, Place, RoundBusy
@@ -32,10 +46,11 @@ class Socket:
     """Sends frames in order without making anybody wait.
 
     A browser that is MAX_BEHIND frames behind gets, instead of those, one picture of the whole when it is
-    there again.
+    there again. What is `checked` is compared with the protocol's table before it goes out.
     """
 
-    def __init__(self, websocket: WebSocket) -> None:
+    def __init__(self, websocket: WebSocket, *, checked: bool = False) -> None:
+        self._checked = checked
         self.tab = ""
         self.place: Place | None = None
         self._websocket = websocket
@@ -46,7 +61,13 @@ class Socket:
         self._behind = False
 
     def send(self, text: str, handed: Handed | None = None) -> None:
-        """Queue a frame; `handed` learns when it was given to the socket."""
+        """Queue a frame; `handed` learns when it was given to the socket.
+
+        Raises:
+            MessageError: it is checked, and not as the protocol's table says.
+        """
+        if self._checked:
+            parse_outgoing(text)
         if len(self._queue) >= MAX_BEHIND:
             self._queue.clear()
             self._behind = True
@@ -89,14 +110,29 @@ class Socket:
             return
 
 
+class Stage(Enum):
+    """How far a conversation has come."""
+
+    GREETING = "the browser has not said hello, or not yet got its place"
+    PLAYING = "the browser has its place in a round"
+    OVER = "nothing more is listened to"
+
+
 class Play:
-    """The endpoint of all play sockets."""
+    """The endpoint of all play sockets; with `debug` every message to a browser is checked."""
 
     def __init__(
-        self, visits: Visits, matches: Matches, messages_per_s: int, address_messages_per_s: int
+        self,
+        visits: Visits,
+        matches: Matches,
+        messages_per_s: int,
+        address_messages_per_s: int,
+        *,
+        debug: bool = False,
     ) -> None:
-        self._visits = visits
-        self._matches = matches
+        self.visits = visits
+        self.matches = matches
+        self._debug = debug
         self._of_visit = Paces(messages_per_s)
         self._of_address = Paces(address_messages_per_s)
         self._arrivals = Paces(SOCKETS_PER_S, SOCKETS_AT_ONCE)
@@ -108,21 +144,21 @@ class Play:
         if self._arrivals.of(token, now_s).wait_s(now_s, patience_s=0.0) > 0:
             await websocket.send_denial_response(Response(status_code=429))
             return
-        if not same_origin(websocket.headers) or await self._visits.find(token) is None:
+        if not same_origin(websocket.headers) or await self.visits.find(token) is None:
             await websocket.close()
             return
         await websocket.accept()
-        socket = Socket(websocket)
+        socket = Socket(websocket, checked=self._debug)
         self._enter(token, socket)
         sender = asyncio.create_task(socket.run())
-        reason = LEFT
+        conversation = Conversation(self, websocket, socket, token)
         try:
-            reason = await self._listen(websocket, socket, token)
+            await conversation.run()
             if socket.closing:
                 await asyncio.wait([sender], timeout=CLOSE_WITHIN_S)
         finally:
             if socket.place is not None:
-                socket.place.match.leave(socket, reason)
+                socket.place.match.leave(socket, conversation.reason)
             sender.cancel()
             self._leave(token, socket)
 
@@ -134,7 +170,7 @@ class Play:
             idle = (one for one in there if one.place is None or one.place.person.connection is not one)
             oldest = next(idle)
             there.remove(oldest)
-            oldest.close(wire.CLOSE_REPLACED)
+            oldest.close(CLOSE_REPLACED)
 
     def _leave(self, token: str, socket: Socket) -> None:
         there = self._open.get(token, [])
@@ -143,96 +179,131 @@ class Play:
         if not there:
             self._open.pop(token, None)
 
-    async def _listen(self, websocket: WebSocket, socket: Socket, token: str) -> str:
-        loop = asyncio.get_running_loop()
-        address = network_of(websocket.client.host) if websocket.client else ""
-        paces = [self._of_visit.of(token, loop.time())]
-        if address:
-            paces.append(self._of_address.of(address, loop.time()))
+    def paces(self, websocket: WebSocket, token: str, now_s: float) -> list[Pace]:
+        """The paces that a connection's messages keep to: its visit's and its address's."""
+        paces = [self._of_visit.of(token, now_s)]
+        if websocket.client:
+            paces.append(self._of_address.of(network_of(websocket.client.host), now_s))
+        return paces
 
-        async def paced() -> None:
-            for pace in paces:
-                await pace.wait()
 
-        hello_by_s = loop.time() + HELLO_WITHIN_S
-        last_seq = -1
-        while True:
-            if socket.place is not None:
-                event = await websocket.receive()
-            else:
-                try:
-                    async with asyncio.timeout_at(hello_by_s):
-                        event = await websocket.receive()
-                except TimeoutError:
-                    socket.close(wire.CLOSE_REFUSED)
-                    return LEFT
-            if event["type"] == "websocket.disconnect":
-                return RESTART if event.get("code") == SERVICE_RESTART else LEFT
-            arrival_s = loop.time()
+class Conversation:
+    """What one browser says from its hello on, each message given to its round; `reason` is why it ended."""
+
+    def __init__(self, play: Play, websocket: WebSocket, socket: Socket, token: str) -> None:
+        self.stage = Stage.GREETING
+        self.reason = LEFT
+        self._play = play
+        self._websocket = websocket
+        self._socket = socket
+        self._token = token
+        self._loop = asyncio.get_running_loop()
+        self._paces = play.paces(websocket, token, self._loop.time())
+        self._hello_by_s = self._loop.time() + HELLO_WITHIN_S
+        self._last_seq = -1
+
+    async def run(self) -> None:
+        """Listen until it is over."""
+        while (frame := await self._frame()) is not None:
+            arrival_s = self._loop.time()
             try:
-                text = event.get("text")
-                frame = event.get("bytes") or b"" if text is None else text
-                message = wire.parse(frame)
-                if isinstance(message, wire.Key | wire.Release):
-                    if message.seq <= last_seq:
-                        raise wire.MessageError(f"seq {message.seq} does not come after {last_seq}")
-                    last_seq = message.seq
-                if isinstance(message, wire.Hello):
-                    busy = await self._hello(socket, token, message)
-                    if busy is not None and busy.address and RELAYED not in websocket.headers:
-                        path = websocket.url.path
-                        code = await pass_on(websocket, busy.address, path, frame, paced)
-                        socket.close(code)
-                    elif busy is not None:
-                        socket.close(wire.CLOSE_BUSY)
-                    if socket.place is None:
-                        return LEFT
-                elif socket.place is None:
-                    raise wire.MessageError("the first message is hello")
-                else:
-                    _pass_on(socket.place, socket, message, arrival_s)
-            except wire.MessageError as error:
-                socket.send(wire.encode("refused", reason=str(error)))
-            await paced()
+                await self._take(frame, arrival_s)
+            except MessageError as error:
+                self._refuse(str(error))
+            if self.stage is Stage.OVER:
+                return
+            await self._paced()
 
-    async def _hello(self, socket: Socket, token: str, hello: wire.Hello) -> RoundBusy | None:
-        """Give the socket its place, or close it, or say that another process has the round.
+    async def _paced(self) -> None:
+        for pace in self._paces:
+            await pace.wait()
 
-        Raises: MessageError for a second hello.
-        """
-        if socket.place is not None:
-            raise wire.MessageError("hello was said already")
-        if hello.protocol != wire.PROTOCOL:
-            socket.send(
-                wire.encode("refused", reason=f"the protocol is {wire.PROTOCOL}; load the page again")
-            )
-            socket.close(wire.CLOSE_REFUSED)
-            return None
-        visit = await self._visits.find(token)
+    async def _frame(self) -> str | bytes | None:
+        """The next frame; None when none comes, because the browser is gone or never said hello."""
         try:
-            place = None if visit is None else await self._matches.of(visit)
-        except RoundBusy as busy:
-            return busy
-        if place is None:
-            socket.close(wire.CLOSE_ENDED)
+            async with asyncio.timeout_at(self._hello_by_s if self.stage is Stage.GREETING else None):
+                event = await self._websocket.receive()
+        except TimeoutError:
+            self._close(CLOSE_REFUSED)
             return None
-        socket.tab = hello.tab
-        socket.place = place
-        place.match.join(place.person, socket)
-        return None
+        if event["type"] == "websocket.disconnect":
+            self.stage = Stage.OVER
+            self.reason = RESTART if event.get("code") == SERVICE_RESTART else LEFT
+            return None
+        text: str | None = event.get("text")
+        return event.get("bytes") or b"" if text is None else text
+
+    async def _take(self, frame: str | bytes, arrival_s: float) -> None:
+        """Use one message.
+
+        Raises:
+            MessageError: it is none of the protocol's, or out of turn.
+        """
+        message = parse(frame)
+        if isinstance(message, Key | Release):
+            if message.seq <= self._last_seq:
+                raise MessageError(f"seq {message.seq} does not come after {self._last_seq}")
+            self._last_seq = message.seq
+        place = self._socket.place
+        if isinstance(message, Hello):
+            if place is not None:
+                raise MessageError("hello was said already")
+            await self._greet(message, frame)
+        elif place is None:
+            raise MessageError("the first message is hello")
+        else:
+            _give(place, self._socket, message, arrival_s)
+
+    async def _greet(self, hello: Hello, frame: str | bytes) -> None:
+        """Give the browser its place, or carry what it says to the process that has the round, or close."""
+        if hello.protocol != PROTOCOL:
+            self._refuse(f"the protocol is {PROTOCOL}; load the page again")
+            self._close(CLOSE_REFUSED)
+            return
+        visit = await self._play.visits.find(self._token)
+        try:
+            place = None if visit is None else await self._play.matches.of(visit)
+        except RoundBusy as busy:
+            self._close(await self._relayed(busy, frame))
+            return
+        if place is None:
+            self._close(CLOSE_ENDED)
+            return
+        self.stage = Stage.PLAYING
+        self._socket.tab = hello.tab
+        self._socket.place = place
+        place.match.join(place.person, self._socket)
+
+    async def _relayed(self, busy: RoundBusy, frame: str | bytes) -> int:
+        """The code to close with, once the process that has the round has said all it had to say."""
+        if not busy.address or RELAYED in self._websocket.headers:
+            return CLOSE_BUSY
+        path = self._websocket.url.path
+        return await pass_on(self._websocket, busy.address, path, frame, self._paced)
+
+    def _refuse(self, reason: str) -> None:
+        self._socket.send(encode({"type": "refused", "reason": reason}))
+
+    def _close(self, code: int) -> None:
+        self.stage = Stage.OVER
+        self._socket.close(code)
 
 
-def _pass_on(place: Place, socket: Socket, message: wire.Incoming, arrival_s: float) -> None:
-    """Give a message to the match. Raises: MessageError when it is out of turn."""
+def _give(place: Place, socket: Socket, message: Incoming, arrival_s: float) -> None:
+    """Give a message to the match.
+
+    Raises:
+        MessageError: it is out of turn.
+    """
     match, person = place.match, place.person
     if person.connection is not socket:
-        raise wire.MessageError("this round is open in another tab")
+        raise MessageError("this round is open in another tab")
     match message:
-        case wire.Ready():
+        case Ready():
             match.ready(person)
-        case wire.Key():
+        case Key():
             match.key(person, message, arrival_s)
-        case wire.Release():
+        case Release():
             match.release(person, message, arrival_s)
-        case wire.Ping():
+        case Ping():
             match.ping(person, message, arrival_s)

@@ -13,7 +13,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import WebSocketException
 
 from galley.errors import GalleyError
-from galley.protocol import messages as wire
+from galley.protocol.messages import CLOSE_BUSY
 
 LOG = logging.getLogger(__name__)
 RELAYED: Final = "x-galley-relayed"
@@ -60,9 +60,9 @@ async def pass_on(
         code = there.close_code
     except (OSError, TimeoutError, WebSocketException) as error:
         LOG.info("the server at %s cannot be reached: %s", address, error)
-        return wire.CLOSE_BUSY
+        return CLOSE_BUSY
     if code is None or code not in FOR_BROWSERS or code in UNSENDABLE:
-        return wire.CLOSE_BUSY
+        return CLOSE_BUSY
     return code
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from galley.protocol import messages as wire
+from galley.protocol.messages import Key, Ping, Release
 from galley.records import ClockRow, KeyRow, Lease, PauseRow, TickRow
 from galley.server.clock import Clock
 
@@ -94,9 +94,9 @@ class RoundJournal:
         )
         self._keeper.journal(self._round_id, ticks=[row], lease=self.lease)
 
-    def key(self, message: wire.Key | wire.Release, arrival_s: float, tick: int, seat: int) -> None:
+    def key(self, message: Key | Release, arrival_s: float, tick: int, seat: int) -> None:
         """Note a key event at a seat and the first tick it can act on."""
-        key, down = (message.key, message.down) if isinstance(message, wire.Key) else ("release", False)
+        key, down = (message.key, message.down) if isinstance(message, Key) else ("release", False)
         row = KeyRow(message.seq, key, down, message.client_ms, self._clock.ms(arrival_s), tick, seat)
         self._keeper.journal(self._round_id, keys=[row], lease=self.lease)
 
@@ -111,7 +111,7 @@ class RoundJournal:
         row = PauseRow(pause.tick, pause.started_ms, self._clock.ms(), pause.reason)
         self._keeper.journal(self._round_id, pauses=[row], lease=self.lease)
 
-    def ping(self, ping: wire.Ping, arrival_s: float, seat: int) -> None:
+    def ping(self, ping: Ping, arrival_s: float, seat: int) -> None:
         """Note a ping, at most one a second of each seat."""
         if arrival_s - self._last_ping_s[seat] >= PING_STORED_EVERY_S:
             self._last_ping_s[seat] = arrival_s

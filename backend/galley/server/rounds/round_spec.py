@@ -1,12 +1,10 @@
-"""What is fixed about a round before it is played, and what of it the browser is told."""
+"""What is fixed about a round before it is played."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
-from galley.protocol.scene import Scene
-from galley.server.rounds.episodes import Course
+from galley.protocol.keyframes import RoundView
 from galley.server.rounds.person import Person
 from galley.study.stages.round_step import InputMode, Partner, ShowScore
 
@@ -33,27 +31,18 @@ class RoundSpec:
     show_score: ShowScore = "during"
     stand_in: str | None = None
 
-
-def picture(spec: RoundSpec, scene: Scene, course: Course, phase: str, person: Person) -> dict[str, Any]:
-    """The parts of a person's keyframe that the kitchen's state does not decide."""
-    rules = course.layout.rules
-    return {
-        "phase": phase,
-        "tick": course.kitchen.tick,
-        "horizon": rules.horizon_ticks,
-        "episode": course.episode,
-        "episodes": course.episodes,
-        "tick_ms": spec.tick_ms,
-        "seat": person.seat,
-        "hats": person.hats,
-        "partner": spec.partner,
-        "input_mode": spec.input_mode,
-        "show_score": spec.show_score,
-        "points": rules.delivery_reward,
-        "grid": scene.grid,
-        "cook_time": rules.cook_time_ticks,
-        "goal": spec.goal,
-        "round": spec.round_no,
-        "of": spec.of,
-        "tutorial": spec.tutorial,
-    }
+    def view(self, person: Person, episodes: int) -> RoundView:
+        """What a person's page is told of it; `episodes` are those of the round."""
+        return RoundView(
+            tick_ms=self.tick_ms,
+            round_no=self.round_no,
+            of=self.of,
+            tutorial=self.tutorial,
+            goal=self.goal,
+            episodes=episodes,
+            seat=person.seat,
+            hats=person.hats,
+            partner=self.partner,
+            input_mode=self.input_mode,
+            show_score=self.show_score,
+        )

@@ -6,10 +6,10 @@ import re
 
 import pytest
 
-from galley.protocol import messages as wire
+from galley.protocol import kinds, messages
 from tests.frontend.pages import FRONTEND
 
-TEXT = (FRONTEND / "js/wire.js").read_text(encoding="utf-8")
+TEXT = (FRONTEND / "js/messages.js").read_text(encoding="utf-8")
 
 
 def _list(name: str) -> list[str]:
@@ -36,25 +36,29 @@ def _shapes() -> dict[str, tuple[set[str], set[str]]]:
 
 
 def test_types_are_those_of_the_table() -> None:
-    assert _list("CLIENT_TYPES") == list(wire.CLIENT)
-    assert sorted(_list("SERVER_TYPES")) == sorted(wire.SERVER)
+    assert _list("CLIENT_TYPES") == list(messages.CLIENT)
+    assert sorted(_list("SERVER_TYPES")) == sorted(messages.SERVER)
 
 
 def test_words_are_those_of_the_table() -> None:
-    assert _list("KEYS") == list(wire.KEYS)
-    assert _union("ReleaseReason") == list(wire.RELEASE_REASONS)
-    assert _union("Phase") == list(wire.PHASES)
-    assert f"PROTOCOL = {wire.PROTOCOL};" in TEXT
+    assert _list("KEYS") == list(kinds.KEYS)
+    assert _union("ReleaseReason") == list(kinds.RELEASE_REASONS)
+    assert _union("Phase") == list(kinds.PHASES)
+    assert f"PROTOCOL = {messages.PROTOCOL};" in TEXT
 
 
 def test_close_codes_are_those_of_the_server() -> None:
     codes = dict(re.findall(r"(\w+): (4\d+)", TEXT))
-    wanted = {"elsewhere": wire.CLOSE_REPLACED, "over": wire.CLOSE_ENDED, "refused": wire.CLOSE_REFUSED}
+    wanted = {
+        "elsewhere": messages.CLOSE_REPLACED,
+        "over": messages.CLOSE_ENDED,
+        "refused": messages.CLOSE_REFUSED,
+    }
     assert {name: int(code) for name, code in codes.items()} == wanted
 
 
-@pytest.mark.parametrize("message", wire.MESSAGES, ids=lambda message: message.name)
-def test_fields_are_those_of_the_table(message: wire.Message) -> None:
+@pytest.mark.parametrize("message", messages.MESSAGES, ids=lambda message: message.name)
+def test_fields_are_those_of_the_table(message: messages.Message) -> None:
     needed, optional = _shapes()[message.name]
     fields = {field.name for field in message.fields}
     assert needed <= fields <= needed | optional

@@ -47,12 +47,12 @@ export const CLOSE = Object.freeze({ elsewhere: 4001, over: 4002, refused: 4003 
  * @property {number} of
  * @property {boolean} tutorial
  * @property {string[] | null} orders
- * @property {number} [points] of one soup
- * @property {number} [episode] of the round, from 1; `tick` and `horizon` are its own, `score` is the round's
- * @property {number} [episodes]
- * @property {"during" | "after" | "never"} [show_score]
- * @property {"hold" | "press"} [input_mode]
- * @property {"agent" | "human" | "none"} [partner]
+ * @property {number} points of one soup
+ * @property {number} episode of the round, from 1; `tick` and `horizon` are its own, `score` is the round's
+ * @property {number} episodes
+ * @property {"during" | "after" | "never"} show_score
+ * @property {"hold" | "press"} input_mode
+ * @property {"agent" | "human" | "none"} partner
  */
 /**
  * @typedef {object} Tick what one tick changed
