@@ -12,7 +12,7 @@ from __future__ import annotations
 from numpy import int16, int32
 from numpy.typing import NDArray
 
-from galley.compiled.kernels import kernel
+from galley.compiled.kernels import lean_kernel
 from galley.kitchen.codes import (
     BIT_BLOCKED,
     BIT_DELIVER,
@@ -64,7 +64,7 @@ from galley.kitchen.pots import (
 from galley.kitchen.rules.shared import ahead, all_delivered, move, use_counter, use_dispenser
 
 
-@kernel
+@lean_kernel
 def _pots_in_use(spec: NDArray[int16], state: NDArray[int16]) -> int:
     """How many pots are partly full, cooking or ready."""
     first = SPEC_TILES + spec[SPEC_WIDTH] * spec[SPEC_HEIGHT]
@@ -75,7 +75,7 @@ def _pots_in_use(spec: NDArray[int16], state: NDArray[int16]) -> int:
     return count
 
 
-@kernel
+@lean_kernel
 def _dish_is_useful(spec: NDArray[int16], state: NDArray[int16], pots_in_use: int) -> bool:
     """Whether taking a dish helps: none lies on a counter and fewer are held than pots are in use.
 
@@ -93,7 +93,7 @@ def _dish_is_useful(spec: NDArray[int16], state: NDArray[int16], pots_in_use: in
     return True
 
 
-@kernel
+@lean_kernel
 def _deliver(spec: NDArray[int16], state: NDArray[int16], recipe: int) -> bool:
     """Whether the delivered soup pays; a soup that matches the first open order closes that order."""
     orders = spec[SPEC_ORDERS]
@@ -107,7 +107,7 @@ def _deliver(spec: NDArray[int16], state: NDArray[int16], recipe: int) -> bool:
     return True
 
 
-@kernel
+@lean_kernel
 def _use_pot(spec: NDArray[int16], state: NDArray[int16], hand: int, slot: int) -> int:
     """The event mask of a chef who interacts with the pot at `slot` of the state: it takes one kind only."""
     held = int(state[hand])
@@ -126,7 +126,7 @@ def _use_pot(spec: NDArray[int16], state: NDArray[int16], hand: int, slot: int) 
     return 0
 
 
-@kernel
+@lean_kernel
 def _interact(spec: NDArray[int16], state: NDArray[int16], chef: int, pots_in_use: int) -> tuple[int, int]:
     """The event mask and the reward of the chef at `chef` of the state, who uses the tile it faces."""
     target = ahead(int(state[chef + CELL]), int(state[chef + FACING]), int(spec[SPEC_WIDTH]))
@@ -154,7 +154,7 @@ def _interact(spec: NDArray[int16], state: NDArray[int16], chef: int, pots_in_us
     return (events | 1 << BIT_USEFUL_DISH if useful else events), 0
 
 
-@kernel
+@lean_kernel
 def classic_step(spec: NDArray[int16], state: NDArray[int16], a0: int, a1: int, out: NDArray[int32]) -> int:
     """The reward of one tick of a kitchen that is not finished: see `galley.kitchen.rules.tick.step`."""
     events0 = 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from numpy import int16
 from numpy.typing import NDArray
 
-from galley.compiled.kernels import kernel
+from galley.compiled.kernels import lean_kernel
 from galley.kitchen.codes import (
     BIT_PICK_UP,
     BIT_PUT_DOWN,
@@ -34,7 +34,7 @@ from galley.kitchen.codes import (
 )
 
 
-@kernel
+@lean_kernel
 def reset(spec: NDArray[int16], state: NDArray[int16]) -> None:
     """Set `state` int16[S] to the start: empty hands, facing north, nothing lying or cooking."""
     state[:] = 0
@@ -42,14 +42,14 @@ def reset(spec: NDArray[int16], state: NDArray[int16]) -> None:
     state[CHEF + CELL] = spec[SPEC_STARTS + 1]
 
 
-@kernel
+@lean_kernel
 def all_delivered(spec: NDArray[int16], state: NDArray[int16]) -> bool:
     """Whether there is an order list and every order of it is delivered."""
     orders = spec[SPEC_ORDERS]
     return bool(orders > 0 and state[ORDERS_DELIVERED] >= orders)
 
 
-@kernel
+@lean_kernel
 def finished(spec: NDArray[int16], state: NDArray[int16]) -> bool:
     """Whether the episode is over: at the horizon, or when every order of the list is delivered."""
     if state[TICK] >= spec[SPEC_HORIZON]:
@@ -57,7 +57,7 @@ def finished(spec: NDArray[int16], state: NDArray[int16]) -> bool:
     return all_delivered(spec, state)
 
 
-@kernel
+@lean_kernel
 def ahead(cell: int, facing: int, width: int) -> int:
     """The cell index one step from `cell` towards `facing`."""
     if facing == NORTH:
@@ -69,7 +69,7 @@ def ahead(cell: int, facing: int, width: int) -> int:
     return cell - 1
 
 
-@kernel
+@lean_kernel
 def use_counter(state: NDArray[int16], hand: int, slot: int) -> int:
     """The event mask of a chef who interacts with the counter at `slot` of the state."""
     held = int(state[hand])
@@ -85,7 +85,7 @@ def use_counter(state: NDArray[int16], hand: int, slot: int) -> int:
     return 0
 
 
-@kernel
+@lean_kernel
 def use_dispenser(state: NDArray[int16], hand: int, tile: int) -> int:
     """The event mask of a chef who interacts with a dispenser."""
     if state[hand] != NOTHING:
@@ -100,7 +100,7 @@ def use_dispenser(state: NDArray[int16], hand: int, tile: int) -> int:
     return 1 << (BIT_TAKE + thing - ONION)
 
 
-@kernel
+@lean_kernel
 def move(spec: NDArray[int16], state: NDArray[int16], a0: int, a1: int) -> tuple[bool, bool]:
     """Whether seat 0's and seat 1's move was blocked. Both turn in any case, and go where there is floor and
     no one else."""

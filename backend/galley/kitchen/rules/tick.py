@@ -5,13 +5,13 @@ from __future__ import annotations
 from numpy import int16, int32, uint8
 from numpy.typing import NDArray
 
-from galley.compiled.kernels import kernel
+from galley.compiled.kernels import lean_kernel
 from galley.kitchen.codes import CLASSIC, SPEC_RULE_SET
 from galley.kitchen.rules.classic import classic_step
 from galley.kitchen.rules.shared import finished
 
 
-@kernel
+@lean_kernel
 def step(spec: NDArray[int16], state: NDArray[int16], a0: int, a1: int, out: NDArray[int32]) -> int:
     """The reward of one tick; changes `state` int16[S] and fills `out` int32[OUT_SIZE].
 
@@ -24,7 +24,7 @@ def step(spec: NDArray[int16], state: NDArray[int16], a0: int, a1: int, out: NDA
     return classic_step(spec, state, a0, a1, out)
 
 
-@kernel
+@lean_kernel
 def step_batch(
     spec: NDArray[int16], states: NDArray[int16], actions: NDArray[uint8], out: NDArray[int32]
 ) -> None:
@@ -33,7 +33,7 @@ def step_batch(
         step(spec, states[index], int(actions[index, 0]), int(actions[index, 1]), out[index])
 
 
-@kernel
+@lean_kernel
 def run(
     spec: NDArray[int16], state: NDArray[int16], joint_actions: NDArray[uint8],
     states: NDArray[int16], out: NDArray[int32],
