@@ -26,6 +26,12 @@ VISIT_OUTCOMES: Final[tuple[VisitOutcome, ...]] = get_args(VisitOutcome)
 ENDED_FROM_OUTSIDE: Final[tuple[VisitOutcome, ...]] = ("timed_out", "expired", "partner_missing")
 """How a visit may end wherever it is."""
 
+NoRoom = Literal["full", "later", "paused", "closed"]
+"""Why a study takes nobody: all slots completed, all taken just now, or its researcher's word."""
+
+TurnedAway = NoRoom | Literal["uninvited", "incomplete"]
+"""Why somebody cannot begin; a link is `incomplete` without the id that the recruiter should fill in."""
+
 VisitStatus = Literal["active"] | VisitOutcome
 VISIT_STATUSES: Final[tuple[str, ...]] = ("active", *VISIT_OUTCOMES, "abandoned")
 """What the records may say of a visit; `abandoned` stands in old databases only."""

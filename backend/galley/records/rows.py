@@ -12,7 +12,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from galley.outcomes import RoundStatus, VisitStatus
+from galley.outcomes import NoRoom, RoundStatus, VisitStatus
 from galley.study.visit.condition_slots import Slot
 
 
@@ -78,10 +78,6 @@ class SlotRow(Slot):
 
     cell: dict[str, Any]
     visit_id: int | None
-
-
-NoRoom = Literal["full", "later", "paused", "closed"]
-"""Why a study takes no visit."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator
 from typing import Final
 
-from galley.outcomes import VISIT_OUTCOMES
 from galley.study.stages.rounds_described import ORDERS
 from galley.study.stages.stage import stage_ids
 from galley.study.study import Study
@@ -70,7 +69,7 @@ def _tail(study: Study) -> Iterator[str]:
     if config.recruitment.invitations is not None:
         yield f"     for {len(study.invitations or ())} invited participants"
     yield f"     completion code: {config.completion.code}"
-    for outcome in VISIT_OUTCOMES[1:]:
+    for outcome in type(config.endings).model_fields:
         code = getattr(config.endings, outcome).code
         if code is not None:
             yield f"     code when {outcome.replace('_', ' ')}: {code}"

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from galley.errors import InvalidFiles, Problem
 from galley.files.reading import Document, Loaded, read
 from galley.kitchen import Layout
-from galley.outcomes import VisitOutcome
+from galley.outcomes import TurnedAway, VisitOutcome
 from galley.study.estimate import estimated_minutes, text_values
 from galley.study.visit.steps import QuestionsStep
 from galley.study.written.crosscheck import agent_problems, kitchen_problems, questionnaire_problems
@@ -77,8 +77,11 @@ class Study:
         questionnaire = self.questionnaires[step.questionnaire]
         return questionnaire if step.item_order is None else questionnaire.arranged(step.item_order)
 
-    def ending(self, outcome: VisitOutcome, link_params: Mapping[str, str]) -> Ending:
-        """What a visit that ended so is shown; its redirect carries the code and the link's parameters."""
+    def ending(self, outcome: VisitOutcome | TurnedAway, link_params: Mapping[str, str]) -> Ending:
+        """What a visit that ended so, or could not begin, is shown.
+
+        Its redirect carries the code and the link's parameters.
+        """
         if outcome == "completed":
             done = self.config.completion
             text = next(s.text for s in self.config.stages if s.kind == "debrief")

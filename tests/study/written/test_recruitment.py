@@ -7,7 +7,7 @@ import pytest
 from galley.errors import InvalidFiles
 from galley.study.check import check_workspace
 from galley.study.study import load_study
-from galley.study.written.recruitment import load_invitations
+from galley.study.written.recruitment import is_placeholder, load_invitations
 from tests.study.studies import GOOD
 from tests.study.workspaces import study_workspace
 
@@ -57,3 +57,37 @@ def test_an_unknown_list_and_an_unkept_person_are_told(tmp_path: Path) -> None:
     unkept = INVITED.replace("workerId", "workerID").replace("invitations: wave, ", "")
     with pytest.raises(InvalidFiles, match="parameter 'workerID' is not kept; did you mean 'workerId'"):
         load_study(study_workspace(tmp_path / "v", unkept), "mine")
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        *("{{%PROLIFIC_PID%}}", "%7B%7B%25PROLIFIC_PID%25%7D%7D", "undefined", "null", "[id]", "None", "NaN"),
+        *(
+            "${e://Field/PROLIFIC_PID}",
+            "<ID>",
+            "__PROLIFIC_PID__",
+            ":participant",
+            "prolific-pid",
+        ),
+        *("[object Object]", "ASSIGNMENT_ID_NOT_AVAILABLE", "--", "{PID}", " ", ""),
+    ],
+)
+def test_f1_a_placeholder_is_nobodys_id(value: str) -> None:
+    assert is_placeholder(value, "PROLIFIC_PID")
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        "5f3a9b0c1d2e3f4a5b6c7d8e",
+        "A1B2C3D4E5F6G7",
+        "auth0|5f3a",
+        "p.lee+2@uni.example",
+        "7",
+        "0",
+        "subject-12",
+    ],
+)
+def test_f1_ids_of_people_are_no_placeholders(value: str) -> None:
+    assert not is_placeholder(value, "PROLIFIC_PID")

@@ -11,6 +11,7 @@ from sqlalchemy import ColumnElement, Connection, Select, func, select
 
 from galley.records.database.tables import ABSENCES, RESPONSES, ROUNDS, SEATS, VISITS
 from galley.study.visit.plan import Plan
+from galley.study.written.recruitment import is_placeholder
 
 # From here on a partner that stands still now and then may be felt.
 LATE_SHARE: Final = 0.01
@@ -22,6 +23,7 @@ FLAGS: Final = {
     "late_agent": "the agent was late or at fault in more than 1% of the ticks played",
     "hidden_tab": "the page was hidden for more than a minute in all",
     "failed_checks": "an attention check was not answered as expected",
+    "no_id": "the link held a placeholder where the recruiter should have put a person's id",
     "slow_client": "in some round, half of all round trips took more than 300 ms",
 }
 """Every kind of flag and what it means."""
@@ -44,7 +46,7 @@ def flags(
     if not tests:
         these = these & ~VISITS.c.test
     found: dict[int, list[Flag]] = defaultdict(list)
-    for rule in (_late, _hidden, _failed, _slow):
+    for rule in (_late, _hidden, _failed, _unnamed, _slow):
         for visit, flag in rule(connection, these):
             found[visit].append(flag)
     return {visit: tuple(of_visit) for visit, of_visit in sorted(found.items())}
@@ -85,6 +87,15 @@ def _failed(connection: Connection, these: ColumnElement[bool]) -> Found:
             visit,
             Flag("failed_checks", float(count), f"{count} checks failed" if count > 1 else "1 check failed"),
         )
+
+
+def _unnamed(connection: Connection, these: ColumnElement[bool]) -> Found:
+    query = select(VISITS.c.id, VISITS.c.link_params).where(these, VISITS.c.person.is_(None))
+    for visit, params in connection.execute(query):
+        for name, value in params.items():
+            if is_placeholder(value, name):
+                yield visit, Flag("no_id", 1.0, f"{name} was {value[:40]!r}")
+                break
 
 
 def _slow(connection: Connection, these: ColumnElement[bool]) -> Found:

@@ -7,10 +7,11 @@ from typing import Any
 
 from sqlalchemy import Connection, select, update
 
+from galley.outcomes import NoRoom
 from galley.records.database.engine import insert_into
 from galley.records.database.tables import QUESTIONS, SLOTS, STUDIES, VISITS
 from galley.records.rows import Arrival, Begun, Planned, SlotRow, VisitRow
-from galley.records.store.queries import visit_row
+from galley.records.store.queries import study_state, visit_row
 from galley.records.store.visit_writes import NEW_VISIT, meet, new_id
 from galley.study.visit.condition_slots import Full, Issue
 
@@ -38,11 +39,9 @@ def begin(
     there = _visit_with(connection, VISITS.c.token == names["token"])
     if there is not None:  # this job was done before, but the server never heard of it
         return Begun(there, "new")
-    if arrival.person is not None and arrival.once and not arrival.test:
-        same = (VISITS.c.study == arrival.study) & (VISITS.c.person == arrival.person) & ~VISITS.c.test
-        there = _visit_with(connection, same)
-        if there is not None:
-            return Begun(there, "again")
+    there = _visit_of(connection, arrival)
+    if there is not None:
+        return Begun(there, "again")
     if study["state"] != "open" and not arrival.test:
         return Begun(None, study["state"])
     slot = None
@@ -61,6 +60,17 @@ def begin(
         _hold(connection, visit, planned.condition if planned.cell is None else planned.cell)
     _keep_factors(connection, visit)
     return Begun(visit, "new")
+
+
+def room_for(connection: Connection, arrival: Arrival, allocate: Allocate) -> NoRoom | None:
+    """Why an arrival would find no room as things stand; None if it would, or comes back to its visit."""
+    if _visit_of(connection, arrival) is not None:
+        return None
+    state = study_state(connection, arrival.study)
+    if state != "open":
+        return state
+    issue = allocate(slots(connection, arrival.study))
+    return ("full" if issue.closed else "later") if isinstance(issue, Full) else None
 
 
 def slots(connection: Connection, study: str) -> list[SlotRow]:
@@ -83,6 +93,14 @@ def slots(connection: Connection, study: str) -> list[SlotRow]:
         )
         for row in connection.execute(query).mappings()
     ]
+
+
+def _visit_of(connection: Connection, arrival: Arrival) -> VisitRow | None:
+    """The visit that somebody had before who may have only one."""
+    if arrival.person is None or not arrival.once or arrival.test:
+        return None
+    same = (VISITS.c.study == arrival.study) & (VISITS.c.person == arrival.person) & ~VISITS.c.test
+    return _visit_with(connection, same)
 
 
 def _visit_with(connection: Connection, condition: Any) -> VisitRow | None:

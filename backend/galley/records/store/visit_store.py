@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from concurrent.futures import Future
 from typing import Any
 
-from galley.outcomes import VISIT_STATUSES
+from galley.outcomes import VISIT_STATUSES, NoRoom
 from galley.records.database.tables import STUDY_STATES, StudyState
 from galley.records.rows import Arrival, Begun, VisitRow
 from galley.records.store import absences, arrivals, queries, visit_writes
@@ -178,6 +178,10 @@ class VisitStore(StoreBase):
         return self.write(
             lambda connection: visit_writes.add_note(connection, visit_id, author, text, round(at_ms))
         )
+
+    def room_for(self, arrival: Arrival, allocate: Allocate) -> Future[NoRoom | None]:
+        """Why an arrival would find no room as things stand; None if it would, or comes back to its visit."""
+        return self.read(lambda connection: arrivals.room_for(connection, arrival, allocate))
 
     def study_state(self, study: str) -> Future[StudyState]:
         """Whether a study takes new visits."""

@@ -24,9 +24,10 @@ from galley.server.participant.step_context import (
     public_study,
     questionnaire_of,
     step_context,
+    turned_away_context,
 )
 from galley.server.participant.time_limits import time_is_up
-from galley.server.participant.visits import GRACE_S, TEST_PARAM, Visit, Visits
+from galley.server.participant.visits import GRACE_S, TEST_PARAM, NotBegun, Visit, Visits
 from galley.server.rounds.lobby import Lobby, Meeting
 from galley.server.rounds.matches import Matches, RoundBusy
 from galley.server.rounds.relay import RELAYED, hand_over
@@ -53,11 +54,6 @@ UNKNOWN_LINK = mark(
 NO_PAGE = mark("There is no page at this address. Please check that the link is complete.")
 FOREIGN = mark("This form was sent from another site, so it was not used.")
 UNREADABLE = mark("This form could not be read, so nothing was changed.")
-INVITED_ONLY = mark("By invitation")
-UNINVITED = mark(
-    "This study is for people who were invited. "
-    "Please use the whole link of your invitation, with the code at its end."
-)
 UNTESTED = mark(
     "This test link is not good any more. Please make a new one on the study's page for researchers."
 )
@@ -132,7 +128,7 @@ class Pages:
         params = _link_params(request)
         why = await self._visits.closed(found, params)
         if why is not None:
-            return self._not_begun(spoken, why)
+            return self._not_begun(spoken, why, params)
         others = {name: value for name, value in params.items() if name != LANGUAGE_PARAM}
         offered = [
             {
@@ -174,9 +170,10 @@ class Pages:
             page = self.plain(429, NOT_YET, CROWDED, language)
             page.headers["retry-after"] = str(math.ceil(wait_s))
             return page
-        begun = await self._visits.begin(found, _link_params(request), language)
+        params = _link_params(request)
+        begun = await self._visits.begin(found, params, language)
         if not isinstance(begun, Visit):
-            return self._not_begun(found.in_language(language), begun)
+            return self._not_begun(found.in_language(language), begun, params)
         return RedirectResponse(begun.url, 303, NEVER_CACHED)
 
     def _begin_wait_s(self, request: Request) -> float:
@@ -309,12 +306,11 @@ class Pages:
             "plain.html", status, title=say(title), message=say(message), status=status, language=language
         )
 
-    def _not_begun(self, study: Study, why: str) -> Response:
-        if why == "uninvited":
-            return self.plain(403, INVITED_ONLY, UNINVITED, study.language)
+    def _not_begun(self, study: Study, why: NotBegun, params: Mapping[str, str]) -> Response:
         if why == "untested":
             return self.plain(403, NOT_USED, UNTESTED, study.language)
-        return self._page("ending.html", study=public_study(study), language=study.language, outcome=why)
+        status = 403 if why in ("uninvited", "incomplete") else 200
+        return self._page("ending.html", status, **turned_away_context(study, why, params))
 
     def _step_page(
         self,

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from galley.outcomes import TurnedAway
 from galley.server.participant.visits import Visit
 from galley.study.scores import wrong_items
 from galley.study.stages.kinds import DebriefStep, QuizStep
@@ -14,6 +15,7 @@ from galley.study.study import Study
 from galley.study.visit.steps import QuestionsStep, Step, TextStep
 from galley.study.written.item_base import Answer
 from galley.study.written.questionnaire import Questionnaire
+from galley.study.written.recruitment import Ending
 
 
 def public_study(study: Study) -> dict[str, Any]:
@@ -83,13 +85,22 @@ def ending_context(visit: Visit) -> dict[str, Any]:
     outcome = visit.progress.status
     if outcome == "active":
         raise ValueError("this visit has not ended")
-    end = visit.study.ending(outcome, visit.row.link_params)
-    text = None if end.text is None else visit.study.texts[end.text]
+    return _ending(visit.study, visit.study.ending(outcome, visit.row.link_params), test=visit.row.test)
+
+
+def turned_away_context(study: Study, why: TurnedAway, params: Mapping[str, str]) -> dict[str, Any]:
+    """What the page is given of somebody who cannot begin; a link without an id fills in none."""
+    known = {} if why == "incomplete" else study.kept(params)
+    return _ending(study, study.ending(why, known), test=False)
+
+
+def _ending(study: Study, end: Ending, *, test: bool) -> dict[str, Any]:
+    text = None if end.text is None else study.texts[end.text]
     return {
-        "study": public_study(visit.study),
-        "language": visit.row.language,
-        "test": visit.row.test,
-        "outcome": outcome,
+        "study": public_study(study),
+        "language": study.language,
+        "test": test,
+        "outcome": end.outcome,
         "title": None if text is None else text.title,
         "html": None if text is None else text.html,
         "code": end.code,

@@ -3,25 +3,35 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Mapping
+import logging
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 from weakref import WeakValueDictionary
 
+from galley.outcomes import TurnedAway
 from galley.records import Arrival, Planned, Store, VisitRow
-from galley.records.rows import NoRoom
 from galley.records.store.links_for_tests import LinkForTests, LinksForTests
 from galley.records.store.visit_state import Attempt, visit_state
 from galley.server.clock import Clock
 from galley.study.stages.round_step import RoundStep
 from galley.study.study import Study
-from galley.study.visit.condition_slots import allocate, capacity, cell_number, cells, slot_in_cell
+from galley.study.visit.condition_slots import (
+    Full,
+    Issue,
+    Slot,
+    allocate,
+    capacity,
+    cell_number,
+    cells,
+    slot_in_cell,
+)
 from galley.study.visit.happenings import Agreed, Ended, Happening, TimedOut
 from galley.study.visit.plan import Plan, plan_visit, visit_seed
 from galley.study.visit.progress import Progress, Refusal, next_progress, position
 from galley.study.visit.steps import Step, TextStep
 from galley.study.written.questionnaire import Questionnaire
-from galley.study.written.recruitment import INVITATION_PARAM
+from galley.study.written.recruitment import INVITATION_PARAM, is_placeholder
 from galley.translations import Catalogues, Translator
 
 GRACE_S: Final = 5.0
@@ -30,7 +40,8 @@ GRACE_S: Final = 5.0
 TEST_PARAM: Final = "galley-test"
 """The parameter of a test link; a name that no recruiter's link has."""
 
-NotBegun = NoRoom | Literal["uninvited", "untested"]
+NotBegun = TurnedAway | Literal["untested"]
+LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,8 +145,26 @@ class Visits:
         if study.invitations is not None:
             code = params.get(INVITATION_PARAM, "")
             return f"code:{code}" if code in study.invitations else None
-        told = study.config.recruitment.participant
-        return (study.kept(params).get(told) if told is not None else None) or None
+        name = study.config.recruitment.participant
+        told = study.kept(params).get(name, "") if name is not None else ""
+        return None if not told.strip() or is_placeholder(told, name or "") else told
+
+    def turned_away(self, study: Study, params: Mapping[str, str]) -> TurnedAway | None:
+        """What is wrong with a link that lets nobody in."""
+        if self.person(study, params) is not None:
+            return None
+        if study.invitations is not None:
+            return "uninvited"
+        asked = study.config.recruitment
+        if asked.participant is None or not asked.required:
+            return None
+        LOG.warning(
+            "%s: turned somebody away whose link has no id as %s but %r; check the link at the recruiter",
+            study.name,
+            asked.participant,
+            study.kept(params).get(asked.participant, ""),
+        )
+        return "incomplete"
 
     async def test_link(
         self, study: Study, params: Mapping[str, str]
@@ -150,28 +179,28 @@ class Visits:
     async def closed(self, study: Study, params: Mapping[str, str]) -> NotBegun | None:
         """Why somebody with such a link cannot begin, as far as is known before they try; None if they can.
 
-        Who may have a visit already is never sent away: beginning leads back to it. Test links always let in.
+        Who has a visit already is never sent away: beginning leads back to it. Test links always let in.
         """
         if self._preview:
             return None
         link = await self.test_link(study, params)
         if link is not None:
             return "untested" if link == "bad" else None
-        who = self.person(study, params)
-        if study.invitations is not None and who is None:
-            return "uninvited"
-        state = await asyncio.wrap_future(self._store.study_state(study.name))
-        return state if state != "open" and who is None else None
+        wrong = self.turned_away(study, params)
+        if wrong is not None:
+            return wrong
+        arrival = self._arrival(study, params, study.language, test=False)
+        return await asyncio.wrap_future(self._store.room_for(arrival, self._allocate(study)))
 
     async def begin(self, study: Study, params: Mapping[str, str], language: str) -> Visit | NotBegun:
         """A visit at its first step, or the one that this person has already, or why there is none."""
-        who = self.person(study, params)
         link = await self.test_link(study, params)
         if link == "bad":
             return "untested"
         test = self._preview or link is not None
-        if study.invitations is not None and who is None and not test:
-            return "uninvited"
+        wrong = None if test else self.turned_away(study, params)
+        if wrong is not None:
+            return wrong
         spoken = study.in_language(language)
         say = self.say(spoken.language)
         design = cells(study.config)
@@ -183,29 +212,31 @@ class Visits:
             made = plan_visit(spoken, seed, visit_no, slot, say)
             return Planned(seed, made.to_json(), made.condition, design[cell_number(study, made.slot)])
 
-        now_ms = self._clock.ms()
-        expires_ms = study.config.slot_expires_min * 60_000.0
-        arrival = Arrival(
-            study.name,
-            study.sha256,
-            now_ms,
-            study.kept(params),
-            spoken.language,
-            who,
-            once=study.invitations is not None or study.config.recruitment.once,
-            test=test,
-        )
-        begun = await asyncio.wrap_future(
-            self._store.begin_visit(
-                arrival, plan, lambda slots: allocate(slots, now_ms, expires_ms, capacity(study))
-            )
-        )
+        arrival = self._arrival(study, params, spoken.language, test=test)
+        begun = await asyncio.wrap_future(self._store.begin_visit(arrival, plan, self._allocate(study)))
         if begun.why != "new" and begun.why != "again":
             return begun.why
         found = None if begun.visit is None else await self.find(begun.visit.token)
         if found is None:
             raise RuntimeError(f"a visit to {study.name} vanished as it began")
         return found
+
+    def _arrival(self, study: Study, params: Mapping[str, str], language: str, *, test: bool) -> Arrival:
+        return Arrival(
+            study.name,
+            study.sha256,
+            self._clock.ms(),
+            study.kept(params),
+            language,
+            self.person(study, params),
+            once=study.invitations is not None or study.config.recruitment.once,
+            test=test,
+        )
+
+    def _allocate(self, study: Study) -> Callable[[Sequence[Slot]], Issue | Full]:
+        """Which slot somebody who arrives now would get."""
+        now_ms, expires_ms = self._clock.ms(), study.config.slot_expires_min * 60_000.0
+        return lambda slots: allocate(slots, now_ms, expires_ms, capacity(study))
 
     # ---- on the way ----------------------------------------------------------------------------------------
 

@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 from galley.errors import InvalidFiles, Problem
 from galley.files.reading import FileModel, faults
 from galley.names import name_fix
-from galley.outcomes import VisitOutcome
+from galley.outcomes import TurnedAway, VisitOutcome
 from galley.study.written.factors import TextName, known_name
 
 PLATFORM_PARAMS: Final = (
@@ -31,6 +31,13 @@ MOST_KEPT_CHARS: Final = 200
 ParamName = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$", max_length=60)]
 Code = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=64)]
 Redirect = Annotated[str, Field(pattern=r"^https://\S+$", max_length=500)]
+
+_BRACKETS: Final = re.compile(r"[{}\[\]<>$%*#]")
+_NOBODY: Final = {
+    *("undefined", "null", "none", "nil", "nan", "n/a", "id", "pid", "participant", "your_id"),
+    "assignment_id_not_available",
+}
+"""What stands in links for an id that nobody filled in, in lower case."""
 
 _PLACE: Final = re.compile(r"\{([^{}]*)\}")
 _INVITATION: Final = re.compile(r"[A-Za-z0-9_-]{6,64}")
@@ -71,6 +78,18 @@ class Endings(FileModel):
     """The visit was away too long and its slot was given to someone else."""
     partner_missing: EndingFile = EndingFile()
     """Nobody came to play with."""
+    full: EndingFile = EndingFile()
+    """No visit began: all visits that are wanted are completed."""
+    later: EndingFile = EndingFile()
+    """No visit began: every slot is taken just now."""
+    paused: EndingFile = EndingFile()
+    """No visit began: the study is paused."""
+    closed: EndingFile = EndingFile()
+    """No visit began: the study is closed."""
+    uninvited: EndingFile = EndingFile()
+    """No visit began: the link carries no code of the list of invitations."""
+    incomplete: EndingFile = EndingFile()
+    """No visit began: the link lacks the id of `recruitment.participant`, or holds a placeholder."""
 
 
 class Attention(FileModel):
@@ -89,6 +108,8 @@ class Recruitment(FileModel):
     """Parameters of the study's link that are stored; all others are dropped."""
     participant: ParamName | None = None
     """Which of them tells a person apart, for instance `PROLIFIC_PID`."""
+    required: bool = True
+    """Whether a link without that id, or with a placeholder for it, is turned away; else flagged."""
     once: bool = True
     """Whether a person has one visit only; coming back leads to it."""
     invitations: Annotated[str, known_name("list of invitations", "invitations")] | None = None
@@ -104,9 +125,9 @@ class Recruitment(FileModel):
 
 @dataclass(frozen=True)
 class Ending:
-    """What a visit that ended shows: `text` is a page of the study, or None for a plain one."""
+    """What a visit that ended, or could not begin, shows: a `text` of the study, or None for a plain page."""
 
-    outcome: VisitOutcome
+    outcome: VisitOutcome | TurnedAway
     text: str | None
     code: str | None
     redirect: str | None
@@ -132,6 +153,28 @@ def kept(params: Mapping[str, str], keep: tuple[str, ...]) -> dict[str, str]:
         for name in keep
         if name in params
     }
+
+
+def is_placeholder(value: str, name: str = "") -> bool:
+    """Whether a parameter's value is nobody's id but what stood where a recruiter should have put one.
+
+    That is a name in brackets of whatever kind (`{{%PROLIFIC_PID%}}`, `${e://Field/PID}`, `[id]`, `<ID>`,
+    `__ID__`), the parameter's own `name`, nothing but signs, or what programs write for nothing
+    (`undefined`, `null`, `[object Object]`, MTurk's ASSIGNMENT_ID_NOT_AVAILABLE). Real ids of recruiters
+    are letters and digits, perhaps with `-`, `_`, `.`, `@` or `+` within.
+    """
+    plain = value.strip()
+    return (
+        bool(_BRACKETS.search(plain))
+        or not plain.strip("-_.")
+        or plain.casefold() in _NOBODY
+        or (bool(name) and _letters(plain) == _letters(name))
+        or bool(re.fullmatch(r"__.*__|:[A-Za-z_]+", plain))
+    )
+
+
+def _letters(text: str) -> str:
+    return re.sub(r"[\W_]", "", text).casefold()
 
 
 def load_invitations(path: Path, shown: str) -> frozenset[str]:
