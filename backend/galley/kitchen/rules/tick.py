@@ -5,7 +5,7 @@ from __future__ import annotations
 from numpy import int16, int32, uint8
 from numpy.typing import NDArray
 
-from galley.compiled.kernels import lean_kernel
+from galley.compiled.kernels import kernel, lean_kernel
 from galley.kitchen.codes import CLASSIC, SPEC_RULE_SET
 from galley.kitchen.rules.classic import classic_step
 from galley.kitchen.rules.shared import finished
@@ -33,7 +33,7 @@ def step_batch(
         step(spec, states[index], int(actions[index, 0]), int(actions[index, 1]), out[index])
 
 
-@lean_kernel
+@kernel
 def run(
     spec: NDArray[int16], state: NDArray[int16], joint_actions: NDArray[uint8],
     states: NDArray[int16], out: NDArray[int32],
