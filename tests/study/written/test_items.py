@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from galley.study.scores import subscale_scores, wrong_items
 from galley.study.visit.draft import item_order
 from galley.study.written.item_base import BaseItem
-from galley.study.written.items import Item, stored_item
+from galley.study.written.items import Item, Number, stored_item
 from galley.study.written.questionnaire import load_questionnaire, validate_answers
 from tests.study.workspaces import ROOT
 from tests.study.written.test_questionnaire import OPTIONS, SCALE, made
@@ -245,3 +245,46 @@ def test_the_fluency_scale_has_the_published_subscales() -> None:
         "carried_weight",
         "human_important",
     }
+
+
+def number(**more: Any) -> Number:
+    return Number.model_validate(
+        {"kind": "number", "id": "n", "text": "How many?", "min": 0, "max": 9999, **more}
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("1,500", "1,500 can be read in two ways. Please write 1500 or 1.5."),
+        ("1.500", "1.500 can be read in two ways. Please write 1500 or 1.5."),
+        ("12.345", "12.345 can be read in two ways. Please write 12345 or 12.3450."),
+        ("2,000", "2,000 can be read in two ways. Please write 2000 or 2.0."),
+    ],
+)
+def test_f4_a_separator_before_three_digits_is_asked_again(text: str, told: str) -> None:
+    with pytest.raises(ValueError, match="can be read in two ways") as caught:
+        number(whole=False).answer([text], str)
+    assert str(caught.value) == told
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("1.5", 1.5),
+        ("1,5", 1.5),
+        ("1,50", 1.5),
+        ("0.125", 0.125),
+        ("0,125", 0.125),
+        ("1.1250", 1.125),
+        ("1500", 1500),
+    ],
+)
+def test_f4_numbers_that_read_one_way_are_taken(text: str, value: float) -> None:
+    assert number(whole=False).answer([text], str) == value
+
+
+@pytest.mark.parametrize("text", ["1,500", "1.500", "1 500", "1'500", "1.5e3", "٣٫٥", "½"])
+def test_f4_whole_numbers_have_no_separators(text: str) -> None:
+    with pytest.raises(ValueError, match="whole number"):
+        number().answer([text], str)

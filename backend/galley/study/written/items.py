@@ -20,6 +20,8 @@ from galley.translations import mark
 
 _WHOLE: Final = re.compile(r"[+-]?\d{1,15}")
 _DECIMAL: Final = re.compile(r"[+-]?\d{1,15}([.,]\d{1,15})?")
+_AMBIGUOUS: Final = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
+"""One separator with three digits behind it: 1,500 is 1500 to some and 1.5 to others, as 1.500 is."""
 STEP_TOLERANCE: Final = 1e-6
 """How far, in steps, a slider's value may lie beside a step: what decimal fractions lose."""
 
@@ -288,10 +290,16 @@ class Number(_Amount):
     """Whether only whole numbers are answers."""
 
     def answer(self, given: Sequence[str], say: Say) -> int | float:
-        """The number; a comma may stand for the decimal point."""
+        """The number; a comma may stand for the decimal point, unless it may as well part thousands."""
         text = given[0]
         if not (_WHOLE if self.whole else _DECIMAL).fullmatch(text):
             raise ValueError(say("Please enter a whole number.") if self.whole else say(self.missing))
+        if not self.whole and _AMBIGUOUS.fullmatch(text):
+            whole, fraction = re.split("[.,]", text)
+            digits = fraction.rstrip("0") or "0"
+            decimal = f"{whole}.{digits + '0' if len(digits) == 3 else digits}"
+            told = say("{text} can be read in two ways. Please write {thousands} or {decimal}.")
+            raise ValueError(told.format(text=text, thousands=whole + fraction, decimal=decimal))
         value = int(text) if self.whole else float(text.replace(",", "."))
         if not self.min <= value <= self.max or not math.isfinite(value):
             told = say("Please enter a number from {least} to {most}.")
