@@ -121,3 +121,15 @@ def test_networks_are_shared_by_the_agents_of_a_bundle(tmp_path: Path) -> None:
     assert loaded.network(ROOM)[0] is loaded.network(ROOM)[0]
     assert loaded.supports("room")
     assert not loaded.supports("hall")
+
+
+def test_a_bundle_says_how_long_its_agent_may_take_and_whether_it_repeats(tmp_path: Path) -> None:
+    text = "format: 1\nname: chef\nkind: scripted\nparams: {policy: stay}\nlayouts: any\n"
+    plain = load_bundle(described(tmp_path, text), "agents/chef")
+    assert (plain.think_ms, plain.repeats) == (None, False)
+    (tmp_path / "slow").mkdir()
+    slow = load_bundle(described(tmp_path / "slow", text + "think_ms: 400\nrepeats: true\n"), "agents/chef")
+    assert (slow.think_ms, slow.repeats) == (400, True)
+    (tmp_path / "wrong").mkdir()
+    (problem,) = told(described(tmp_path / "wrong", text + "think_ms: 0\n"))
+    assert problem.startswith("agents/chef/agent.yaml:6: ")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import time
 
 import numpy as np
 import pytest
@@ -114,6 +115,24 @@ class Strange(Stay):
 )
 def test_broken_promises_are_told_with_their_mending(agent: type[Agent], what: str, fix: str) -> None:
     assert any(str(one).startswith(what) and fix in one.fix for one in check(agent, ROOM).faults)
+
+
+class Sleeping(Stay):
+    """An agent that waits for something, at no cost of the processor."""
+
+    def act(self, state: State, tick: int) -> int:
+        time.sleep(0.01)
+        return STAY
+
+
+def test_who_declares_how_long_it_may_take_is_held_to_it_by_the_wall_clock() -> None:
+    assert check(Sleeping, ROOM, ticks=20).faults == ()
+    found = check(Sleeping, ROOM, think_ms=1000)
+    assert found.faults == ()
+    assert found.decision_p50_ms >= 10
+    (fault,) = check(Sleeping, ROOM, think_ms=5).faults
+    assert "more than 5 ms" in fault.what
+    assert "think_ms" in fault.fix
 
 
 def test_each_kind_of_fault_is_told_once() -> None:

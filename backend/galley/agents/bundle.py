@@ -38,6 +38,8 @@ class Description(FileModel):
     encoding: str | None = None
     sampling: Sampling | None = None
     unstuck_after_ticks: Literal["none"] | Annotated[int, pydantic.Field(ge=1, le=100)] | None = None
+    think_ms: Annotated[int, pydantic.Field(ge=1, le=60_000)] | None = None
+    repeats: bool = False
     params: dict[str, str | int | float | bool] = pydantic.Field(default_factory=dict)
     layouts: Literal["any"] | dict[str, str]
 
@@ -57,6 +59,16 @@ class Bundle:
     def supports(self, layout_name: str) -> bool:
         """Whether the agent can play on the layout of this name."""
         return self.layouts is None or layout_name in self.layouts
+
+    @property
+    def think_ms(self) -> int | None:
+        """How long the agent may take for a decision, ms; None for one that is always in time."""
+        return self.loaded.value.think_ms
+
+    @property
+    def repeats(self) -> bool:
+        """Whether the agent does again what it decided last while it has not decided anew."""
+        return self.loaded.value.repeats
 
     def make(self) -> Agent:
         """A fresh agent; all agents of one bundle share its networks."""

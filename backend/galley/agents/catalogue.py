@@ -77,7 +77,7 @@ class Catalogue:
 def problems_on(bundle: Bundle, layout: Layout) -> tuple[Problem, ...]:
     """Every promise that a bundle's agents break on a layout, at its line in agent.yaml."""
     try:
-        faults = check(bundle.make, layout).faults
+        faults = check(bundle.make, layout, think_ms=bundle.think_ms).faults
     except InvalidFiles as error:
         return error.problems
     place = ("layouts",) if bundle.layouts is None else ("layouts", layout.name)

@@ -26,6 +26,9 @@ SEED: Final = 1
 SLOWEST_MS: Final = 50.0
 """A third of a tick of 150 ms: the 99th percentile of decision times must stay below."""
 
+SLOW_TICKS: Final = 20
+"""So many of an agent that declares how long it may take: each may take that long."""
+
 _MOVES: Final = f"0 to {len(ACTIONS) - 1} ({', '.join(ACTIONS)})"
 
 
@@ -45,7 +48,8 @@ class Conduct:
     """What an agent did beside itself; `faults` says what was wrong, each kind once.
 
     Decision times are those of both seats, ms, in processor time of the deciding thread, so what else the
-    machine does is not held against the agent; NaN if nothing could be played.
+    machine does is not held against the agent (wall time for one that declares how long it may take); NaN if
+    nothing could be played.
     """
 
     layout: str
@@ -55,19 +59,26 @@ class Conduct:
     decision_p99_ms: float
 
 
-def check(make: Callable[[], Agent], layout: Layout, ticks: int = CHECKED_TICKS) -> Conduct:
+def check(
+    make: Callable[[], Agent], layout: Layout, ticks: int = CHECKED_TICKS, think_ms: int | None = None
+) -> Conduct:
     """How agents fresh from `make` play beside themselves for `ticks` ticks, or to the end of the episode.
 
     They must answer every state with an action, in time; act the same when reset with the same seed, whatever
     came before, and however often they are asked; and act the same when they were only shown what was done.
-    An agent that fails in a tick stays, as in a round, and is asked again in the next.
+    An agent that fails in a tick stays, as in a round, and is asked again in the next. One that declares how
+    long it may take (`think_ms`) is tried for SLOW_TICKS at most, and its times are those of the wall clock:
+    what it waits for counts as well.
 
     Raises:
         InvalidFiles: a file that the agent needs cannot be used.
     """
     nan = float("nan")
     faults: list[Fault] = []
-    first, again = (tuple(_Watched(make(), faults) for _ in range(2)) for _ in range(2))
+    clock = time.thread_time if think_ms is None else time.monotonic
+    if think_ms is not None:
+        ticks = min(ticks, SLOW_TICKS)
+    first, again = (tuple(_Watched(make(), faults, clock) for _ in range(2)) for _ in range(2))
     try:
         played = play_episode(layout, (first[0], first[1]), SEED, ticks)
         play_episode(layout, (again[0], again[1]), SEED, ticks)
@@ -84,9 +95,11 @@ def check(make: Callable[[], Agent], layout: Layout, ticks: int = CHECKED_TICKS)
         )
     times_ms = [spent for one in first for spent in one.times_ms] or [0.0]
     slowest = float(np.percentile(times_ms, 99))
-    if slowest > SLOWEST_MS:
-        what = f"decisions are slow: 99th percentile {slowest:.1f} ms, more than {SLOWEST_MS:.0f} ms"
-        faults.append(Fault(what, "work out in `reset` what can be known before, or plan less far"))
+    most_ms = SLOWEST_MS if think_ms is None else think_ms
+    if slowest > most_ms:
+        what = f"decisions are slow: 99th percentile {slowest:.1f} ms, more than {most_ms:.0f} ms"
+        fix = "work out in `reset` what can be known before, or plan less far"
+        faults.append(Fault(what, fix if think_ms is None else "declare a longer think_ms in agent.yaml"))
     if not faults:
         faults += _seen_only(make, again[0].agent, layout, ticks)
     score = play(layout, played.joint_actions).score
@@ -134,7 +147,10 @@ def _seen_only(make: Callable[[], Agent], used: Agent, layout: Layout, ticks: in
 class _Watched:
     """An agent whose `answers`, `times_ms` and `faults` are noted, and which stays when it fails."""
 
-    def __init__(self, agent: Agent, faults: list[Fault]) -> None:
+    def __init__(
+        self, agent: Agent, faults: list[Fault], clock: Callable[[], float] = time.thread_time
+    ) -> None:
+        self._clock = clock
         self.agent = agent
         self.faults = faults
         self.answers: list[Any] = []
@@ -146,10 +162,10 @@ class _Watched:
 
     def act(self, state: NDArray[np.int16], tick: int) -> int:
         """The agent's answer; to stay if it has none that is an action."""
-        start = time.thread_time()
+        start = self._clock()
         action, fault = self._asked(state, tick)
         if tick >= WARM_UP_TICKS:
-            self.times_ms.append(1000 * (time.thread_time() - start))
+            self.times_ms.append(1000 * (self._clock() - start))
         self.answers.append(action)
         if fault is not None:
             self.faults.append(fault)

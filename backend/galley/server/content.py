@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from concurrent.futures import Future
 from dataclasses import dataclass
+from threading import Thread
 
+from galley.agents.bundle import Bundle
 from galley.agents.catalogue import Catalogue
 from galley.agents.episode import play_episode
 from galley.agents.scripted import Stay
@@ -20,6 +23,7 @@ from galley.workspace import Workspace
 
 REHEARSED_TICKS = 3
 REHEARSED_VISITS = 64
+MADE_READY_WITHIN_S = 30.0
 REHEARSED_PER_CELL = 8
 
 
@@ -72,10 +76,7 @@ def _rehearse(studies: Mapping[str, Study], layouts: Mapping[str, Layout], catal
     for name, layout in sorted(met, key=lambda pair: (pair[0], pair[1].name)):
         bundle = catalogue.bundle(name)
         try:
-            for seat in (0, 1):
-                agent = bundle.make()
-                agents = (agent, Stay()) if seat == 0 else (Stay(), agent)
-                play_episode(layout, agents, seed=0, ticks=REHEARSED_TICKS)
+            _play_both_seats(bundle, layout)
         except GalleyError:
             raise
         except Exception as error:
@@ -83,6 +84,40 @@ def _rehearse(studies: Mapping[str, Study], layouts: Mapping[str, Layout], catal
                 f"agents/{name}: it cannot play on layout {layout.name} ({type(error).__name__}: {error}); "
                 "run `galley agents check`"
             ) from error
+
+
+def _play_both_seats(bundle: Bundle, layout: Layout) -> None:
+    """Play a few ticks on either seat; an agent that declares how long it may take gets that time."""
+
+    def few_ticks() -> None:
+        for seat in (0, 1):
+            agent = bundle.make()
+            agents = (agent, Stay()) if seat == 0 else (Stay(), agent)
+            play_episode(layout, agents, seed=0, ticks=REHEARSED_TICKS)
+
+    if bundle.think_ms is None:
+        few_ticks()
+        return
+    played: Future[None] = Future()
+
+    def attempt() -> None:
+        try:
+            few_ticks()
+        except Exception as error:  # handed to who waits
+            played.set_exception(error)
+        else:
+            played.set_result(None)
+
+    within_s = 2 * REHEARSED_TICKS * bundle.think_ms / 1000 + MADE_READY_WITHIN_S
+    # A daemon: one that never answers must not keep the process from ending.
+    Thread(target=attempt, name=f"galley-rehearsal-{bundle.name}", daemon=True).start()
+    try:
+        played.result(within_s)
+    except TimeoutError:
+        raise GalleyError(
+            f"agents/{bundle.name}: {REHEARSED_TICKS} decisions on each seat of layout {layout.name} took "
+            f"longer than {within_s:.0f} s; declare a longer think_ms, or mend the agent"
+        ) from None
 
 
 def _rounds(study: Study) -> Iterator[RoundStep]:

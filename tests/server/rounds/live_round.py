@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from galley.kitchen import EAST, Kitchen, Layout
+from galley.kitchen import EAST, STAY, Kitchen, Layout
 from galley.protocol.codec import parse_outgoing
 from galley.protocol.messages import Key, Release
 from galley.records import ClockRow, KeyRow, Lease, PauseRow, TickRow
@@ -111,6 +111,7 @@ class Asked:
 
     def __init__(self, answer: Answer | None) -> None:
         self.answer = answer
+        self.late_action = STAY
 
 
 class Answering:
@@ -127,6 +128,9 @@ class Answering:
 
     def restart(self, layout: Layout, seat: int, seed: int) -> None:
         self.restarts += [(seat, seed)]
+
+    def stop(self) -> None:
+        pass
 
 
 class Round:

@@ -54,7 +54,7 @@ def gate(bundle: Bundle, layout: Layout) -> tuple[Figures, tuple[str, ...]]:
     long = layout.with_rules(horizon_ticks=max(GATE_TICKS, layout.rules.horizon_ticks))
     nan = float("nan")
     try:
-        found = check(bundle.make, long, GATE_TICKS)
+        found = check(bundle.make, long, GATE_TICKS, bundle.think_ms)
     except InvalidFiles as error:
         nothing = Figures(layout.name, 0, 0, nan, nan, nan, nan)
         return nothing, tuple(problem.message for problem in error.problems)

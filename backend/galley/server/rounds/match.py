@@ -268,7 +268,9 @@ class Match:
         for seat, question in self._questions.items():
             answer = question.answer
             late = answer is None
-            if answer is not None:
+            if answer is None:
+                actions[seat] = question.late_action
+            else:
                 decision_ms, fault = answer.decision_ms, answer.fault
                 if answer.action is not None:
                     actions[seat] = answer.action
@@ -460,6 +462,12 @@ class Match:
         if self.under_way:
             self._stand_still(RESTART)
         self._cancel_both()
+
+    def stop_minds(self) -> None:
+        """Let the agents go: nothing more is asked of them."""
+        for player in self.players:
+            if not isinstance(player, Person):
+                player.stop()
 
     # ---- small parts ---------------------------------------------------------------------------------------
 

@@ -8,6 +8,7 @@ import logging
 import secrets
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 from weakref import WeakValueDictionary
 
@@ -27,6 +28,7 @@ from galley.server.rounds.person import Person
 from galley.server.rounds.round_journal import RoundJournal
 from galley.server.rounds.round_spec import RoundSpec
 from galley.server.rounds.set_up import of_one, of_two
+from galley.server.rounds.slow_mind import SlowMind
 from galley.server.rounds.takeover import caught_up, ready_agent
 from galley.server.rounds.thinking import Mind, Thinking
 from galley.study.stages.round_step import RoundStep
@@ -187,6 +189,7 @@ class Matches:
         """
         for live in tuple(self._live.values()):
             live.match.stop()
+            live.match.stop_minds()
             await live.match.ended()
             lease = live.match.journal.lease
             if lease is not None and live.match.phase != "ended":
@@ -331,8 +334,12 @@ class Matches:
         bundle = self._catalogue.bundle(name)
         if bundle.sha256 != sha256:
             LOG.warning("round %d goes on with another version of agent %s", row.id, name)
-        agent = await self._think(lambda: ready_agent(bundle, course, seat, spec.seeds, row.joint_actions))
-        return Mind(self._thinking, agent, name)
+        # What the kitchen has come to is read now: a slow agent looks at it while the round goes on.
+        seen = row.joint_actions[len(row.joint_actions) - course.kitchen.tick :]
+        ready = partial(ready_agent, bundle, course.layout, seat, spec.seeds[course.episode - 1], seen)
+        if bundle.think_ms is not None:
+            return SlowMind(ready, name, bundle.think_ms, repeats=bundle.repeats)
+        return Mind(self._thinking, await self._think(ready), name, repeats=bundle.repeats)
 
     async def _think(self, work: Any) -> Any:
         return await asyncio.wrap_future(self._thinking.do(work))
@@ -390,6 +397,7 @@ class Matches:
 
     def forget(self, match: Match) -> None:
         """Let go of a match; the next connection makes it anew from the journal."""
+        match.stop_minds()
         live = self._live.get(match.spec.round_id)
         if live is None or live.match is not match:
             return

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,18 +26,14 @@ def caught_up(layout: Layout, episodes: int, joint_actions: NDArray[np.uint8]) -
     return course
 
 
-def ready_agent(
-    bundle: Bundle, course: Course, seat: int, seeds: Sequence[int], joint_actions: NDArray[np.uint8]
-) -> Agent:
-    """An agent of the bundle that has seen the episode that a kitchen is in, as if it had always played it.
+def ready_agent(bundle: Bundle, layout: Layout, seat: int, seed: int, seen: NDArray[np.uint8]) -> Agent:
+    """An agent of the bundle that has seen an episode so far (uint8 [T, 2]), as if it had always played it.
 
     One that fails at that is replaced by one that stays where it is.
     """
-    layout = course.layout
-    seen = joint_actions[len(joint_actions) - course.kitchen.tick :]
     try:
         agent: Agent = bundle.make()
-        take_up(agent, layout, seat, seeds[course.episode - 1], seen)
+        take_up(agent, layout, seat, seed, seen)
     except Exception:  # whatever a researcher's agent raises, the round goes on
         LOG.exception("agent %s cannot take up a round on layout %s", bundle.name, layout.name)
         return Unable()

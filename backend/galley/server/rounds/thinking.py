@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from galley.agents.agent_batch import act_all
 from galley.agents.protocol import Agent
-from galley.kitchen import ACTIONS, Layout
+from galley.kitchen import ACTIONS, STAY, Layout
 
 T = TypeVar("T")
 LOG = logging.getLogger(__name__)
@@ -33,10 +33,19 @@ class Answer:
     fault: str | None
 
 
+class LastDecision:
+    """What an agent decided last in an episode; None before it decided anything."""
+
+    __slots__ = ("action",)
+
+    def __init__(self) -> None:
+        self.action: int | None = None
+
+
 class Question:
     """What one agent shall do at one tick; `answer` is there as soon as the thinking thread has set it."""
 
-    __slots__ = ("answer", "asked_s", "mind", "seen", "state", "tick")
+    __slots__ = ("answer", "asked_s", "last", "mind", "seen", "state", "tick")
 
     def __init__(
         self,
@@ -49,17 +58,28 @@ class Question:
         self.tick = tick
         self.state = state
         self.seen = seen
+        self.last = mind.last
         self.asked_s = time.monotonic()
         self.answer: Answer | None = None
 
+    @property
+    def late_action(self) -> int:
+        """What is done when no answer is there: to stay, or what an agent that repeats decided last."""
+        return STAY if self.last.action is None or not self.mind.repeats else self.last.action
+
 
 class Mind:
-    """One agent at work in one round. Only the thinking thread touches the agent itself."""
+    """One agent at work in one round. Only the thinking thread touches the agent itself.
 
-    def __init__(self, thinking: Thinking, agent: Agent, name: str) -> None:
+    An agent that `repeats` does again what it decided last in the episode while it has not decided anew.
+    """
+
+    def __init__(self, thinking: Thinking, agent: Agent, name: str, *, repeats: bool = False) -> None:
         self._thinking = thinking
         self.agent: Agent = agent
         self.name = name
+        self.repeats = repeats
+        self.last = LastDecision()
         self.newest: Question | None = None
         self.told_fault = False
 
@@ -87,21 +107,30 @@ class Mind:
                 LOG.exception("agent %s cannot begin again on layout %s", self.name, layout.name)
                 self.agent = Unable()
 
+        # What is still being decided was asked in the episode before, and is kept with it.
+        self.last = LastDecision()
         self._thinking.do(begin)
+
+    def stop(self) -> None:
+        """The round is over or goes on elsewhere; the thread they share belongs to all."""
 
 
 class Unable:
     """Stands in for an agent that could not be made ready: each decision is a fault, so it stays."""
 
     def reset(self, layout: Layout, seat: int, seed: int) -> None:
-        """Nothing to begin."""
+        """Begin nothing."""
 
     def act(self, state: NDArray[np.int16], tick: int) -> int:
-        """Never an action. Raises: RuntimeError."""
+        """Never an action.
+
+        Raises:
+            RuntimeError: always.
+        """
         raise RuntimeError("the agent could not be made ready for this round")
 
     def observe(self, state: NDArray[np.int16], joint_action: tuple[int, int]) -> None:
-        """Nothing to note."""
+        """Note nothing."""
 
 
 class Thinking:
@@ -111,15 +140,18 @@ class Thinking:
     rounds there are the more of them share a batch.
     """
 
-    def __init__(self, window_s: float = 0.01) -> None:
+    def __init__(self, window_s: float = 0.01, name: str = "galley-thinking") -> None:
+        self.busy_since_s: float | None = None
         self._window_s = window_s
+        self._name = name
+        self._leaving = False
         self._began_s = 0.0
         self._work: SimpleQueue[Question | Callable[[], None] | None] = SimpleQueue()
         self._thread: threading.Thread | None = None
 
     def start(self) -> None:
         """Begin to think."""
-        self._thread = threading.Thread(target=self._run, name="galley-thinking", daemon=True)
+        self._thread = threading.Thread(target=self._run, name=self._name, daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
@@ -128,6 +160,11 @@ class Thinking:
             self._work.put(None)
             self._thread.join()
             self._thread = None
+
+    def leave(self) -> None:
+        """End the thread without waiting for it, and drop what it has not begun."""
+        self._leaving = True
+        self._work.put(None)
 
     def put(self, question: Question) -> None:
         """Queue a question."""
@@ -164,13 +201,17 @@ class Thinking:
             except Empty:
                 pass
             questions: list[Question] = []
+            self.busy_since_s = time.monotonic()
             for work in batch:
+                if self._leaving:
+                    return
                 if isinstance(work, Question):
                     self._show(work)
                     questions.append(work)
                 elif work is not None:
                     work()
             self._decide([question for question in questions if question.mind.newest is question])
+            self.busy_since_s = None
             if None in batch:
                 return
 
@@ -214,6 +255,8 @@ class Thinking:
         if fault is None and not (isinstance(action, (int, np.integer)) and 0 <= action < len(ACTIONS)):
             self._tell(question.mind, f"decided {action!r}, which is no action", trace=False)
             action, fault = None, FAULT_INVALID
+        if action is not None:
+            question.last.action = int(action)
         question.answer = Answer(None if action is None else int(action), decision_ms, fault)
 
     @staticmethod
