@@ -22,6 +22,7 @@ serve: $(BASE) ## set up without PyTorch, then serve the demo study (PORT=8000 D
 test: $(ALL) ## set up everything, then run the tests
 	@sh tests/chromium.sh > /dev/null
 	@sh tests/postgres.sh
+	@sh tests/nginx.sh
 	@$(PY) tests/overcooked_package.py > /dev/null
 	@CHROMIUM="$$(sh tests/chromium.sh)" $(PY) -m pytest
 
@@ -38,6 +39,7 @@ bench: $(ALL) ## run every benchmark, one JSON object per figure
 verify: lint ## no time limit: lint, tests with long fuzzing, the whole demo study in Chromium, benchmarks
 	@sh tests/chromium.sh > /dev/null
 	@sh tests/postgres.sh
+	@sh tests/nginx.sh
 	@$(PY) tests/overcooked_package.py > /dev/null
 	CHROMIUM="$$(sh tests/chromium.sh)" $(PY) -m pytest -m "full or not full" --hypothesis-profile=long --timeout=7200
 	$(MAKE) bench

@@ -4,12 +4,14 @@ import { CLOSE, hello, parse, ping } from "./messages.js";
 
 /** @typedef {import("./messages.js").ClientMessage} ClientMessage */
 /** @typedef {import("./messages.js").ServerMessage} ServerMessage */
-/** @typedef {"connecting" | "open" | "lost" | "elsewhere" | "over" | "refused"} Link */
+/** @typedef {"connecting" | "open" | "lost" | "elsewhere" | "over" | "refused" | "blocked"} Link */
+/** @typedef {{ missing: string, origin: string, host: string }} Why what a proxy does not pass on */
 
 const FIRST_WAIT_MS = 250;
 const LONGEST_WAIT_MS = 4000;
 const PING_EVERY_MS = 2000;
 const SILENCE_MS = 7000;
+const TRIES_BEFORE_ASKING = 2;
 
 /** @type {Readonly<Record<number, Link>>} */
 const FINAL = Object.freeze({ [CLOSE.elsewhere]: "elsewhere", [CLOSE.over]: "over", [CLOSE.refused]: "refused" });
@@ -18,7 +20,7 @@ export class Connection {
   /**
    * @param {string} path of the socket on this host
    * @param {(message: ServerMessage) => void} onMessage
-   * @param {(link: Link) => void} onLink
+   * @param {(link: Link, why?: Why) => void} onLink
    */
   constructor(path, onMessage, onLink) {
     const url = new URL(path, location.href);
@@ -31,6 +33,8 @@ export class Connection {
     this.socket = null;
     this.tries = 0;
     this.stopped = false;
+    /** Whether any socket of this page ever opened. */
+    this.opened = false;
     /** @type {number | null} */
     this.rtt = null;
     this.heardAt = 0;
@@ -46,6 +50,7 @@ export class Connection {
     const socket = new WebSocket(this.url);
     this.socket = socket;
     socket.addEventListener("open", () => {
+      this.opened = true;
       this.heardAt = performance.now();
       this.rtt = null;
       this.send(hello(this.tab));
@@ -80,9 +85,21 @@ export class Connection {
       return;
     }
     this.onLink("lost");
+    if (!this.opened && this.tries === TRIES_BEFORE_ASKING) this.askWhy();
     const wait = Math.min(LONGEST_WAIT_MS, FIRST_WAIT_MS * 2 ** this.tries) * (0.75 + Math.random() / 2);
     this.tries += 1;
     window.setTimeout(() => this.open(), wait);
+  }
+
+  /** Asks by an ordinary request what keeps the socket from opening: a proxy may pass on too little. */
+  async askWhy() {
+    try {
+      const url = `${this.url.replace(/^ws/, "http")}?origin=${encodeURIComponent(location.origin)}`;
+      const answer = await fetch(url, { cache: "no-store" });
+      if (answer.ok && !this.opened) this.onLink("blocked", await answer.json());
+    } catch {
+      // The network is away as well: nothing to tell.
+    }
   }
 
   /** @param {Link} link */

@@ -68,6 +68,6 @@ function redraw(figure, images) {
 
 const figures = [...document.querySelectorAll("figure.kitchen-picture")];
 if (figures.length > 0) {
-  const images = await loadImages("/static/sprites/");
+  const images = await loadImages(new URL("../sprites/", import.meta.url).href);
   for (const figure of figures) if (figure instanceof HTMLElement) redraw(figure, images);
 }

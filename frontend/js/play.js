@@ -30,7 +30,8 @@ class Round {
     /** @type {Board | null} */
     this.board = null;
     this.over = false;
-    this.link = new Connection(root.dataset.socket ?? "", (message) => this.hear(message), (link) => this.linked(link));
+    this.blocked = false;
+    this.link = new Connection(root.dataset.socket ?? "", (message) => this.hear(message), (link, why) => this.linked(link, why));
     this.keys = new Keys(
       (name, down) => {
         this.link.send(key(name, down, this.link.nextSeq(), performance.now()));
@@ -132,18 +133,23 @@ class Round {
     this.keys.enable(false);
     this.sounds.play("end");
     const { say } = this;
-    const press = () => location.assign(next || this.root.dataset.next || location.href);
+    const press = () => location.assign(this.root.dataset.next || next || location.href);
     const [title, text] = outcome === "finished" ? [say("over"), summary(board, score, this.root.dataset.bonus, say)]
       : outcome === "partner_left" ? [say("partner_left"), say("partner_left_text")] : [say("closed"), say("closed_text")];
     this.hud.show({ kind: "end", title, text, button: say("continue"), press, after: END_CARD_MS });
   }
 
-  /** @param {Link} link */
-  linked(link) {
+  /** @param {Link} link @param {import("./connection.js").Why} [why] */
+  linked(link, why) {
     if (this.over) return;
     const { say } = this;
     const reload = () => location.reload();
-    if (link === "lost") {
+    if (link === "blocked" && why) {
+      const text = `${say(why.missing === "host" ? "blocked_host" : "blocked_websocket")} (Origin ${why.origin}, Host ${why.host})`;
+      this.hud.show({ kind: "lost", title: say("blocked"), text });
+      this.blocked = true;
+    }
+    if (link === "lost" && !this.blocked) {
       if (this.board?.phase === "playing") this.board.phase = "paused";
       this.keys.enable(false);
       this.hud.show({ kind: "lost", title: say("lost"), text: say("lost_text") });

@@ -28,6 +28,7 @@ CLASSES: dict[str, str] = {
     "HEAD /v/{token}": TOKEN,
     "POST /v/{token}": TOKEN,
     "POST /v/{token}/away": TOKEN,
+    "GET /v/{token}/play": TOKEN,
     "GET /v/{token}/lobby": TOKEN,
     "SOCKET /v/{token}/play": TOKEN,
     "GET /researcher/login": OPEN,

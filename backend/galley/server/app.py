@@ -15,6 +15,7 @@ from starlette.types import Scope
 
 from galley.errors import GalleyError
 from galley.records import Store
+from galley.server.base_path import BasePath
 from galley.server.clock import Clock
 from galley.server.content import Content
 from galley.server.garbage_collection import collect_between_rounds, few_collections
@@ -107,6 +108,7 @@ def create_app(content: Content, store: Store, settings: Settings, *, preview: b
     if settings.requests_per_s:
         app.add_middleware(PerAddress, per_s=settings.requests_per_s)
     app.add_middleware(SecureHeaders)
+    app.add_middleware(BasePath, base=settings.base_path)
 
     async def not_here(_request: Request, error: Exception) -> Response:
         status = error.status_code if isinstance(error, HTTPException) else 404

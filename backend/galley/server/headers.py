@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from urllib.parse import urlsplit
 
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+LOG = logging.getLogger(__name__)
 
 HEADERS: Mapping[str, str] = {
     "content-security-policy": (
@@ -19,6 +22,7 @@ HEADERS: Mapping[str, str] = {
     "cross-origin-opener-policy": "same-origin",
     "permissions-policy": "camera=(), microphone=(), geolocation=()",
 }
+DEFAULT_PORTS: Mapping[str, int] = {"http": 80, "https": 443}
 
 
 def same_origin(headers: Mapping[str, str]) -> bool:
@@ -31,11 +35,34 @@ def same_origin(headers: Mapping[str, str]) -> bool:
     """
     site = headers.get("sec-fetch-site")
     origin = headers.get("origin")
-    if site is not None and site not in ("same-origin", "none"):
+    if site is not None:
+        return site in ("same-origin", "none")
+    return origin is None or origin == "null" or names_host(headers)
+
+
+def names_host(headers: Mapping[str, str]) -> bool:
+    """Whether Origin is the host that was asked, as Host or a proxy's X-Forwarded-Host tells it.
+
+    A host without a port is compared by its name alone: some proxies drop the port.
+    """
+    asked = (headers.get("host", ""), headers.get("x-forwarded-host", "").split(",")[0].strip())
+    try:
+        origin = urlsplit(headers.get("origin", ""))
+        port = origin.port or DEFAULT_PORTS.get(origin.scheme)
+        hosts = [urlsplit(f"//{host}") for host in asked if host]
+        return any(host.hostname == origin.hostname and host.port in (None, port) for host in hosts)
+    except ValueError:
         return False
-    if origin is None or origin == "null":
-        return True
-    return urlsplit(origin).netloc.lower() == headers.get("host", "").lower()
+
+
+def tell_foreign(headers: Mapping[str, str]) -> None:
+    """Log what a refused socket said: the page of another site, or a proxy that hides the name of ours."""
+    LOG.warning(
+        "a round's socket was refused: its page is of %.200r, but the host asked for is %.200r; "
+        "if they are the same site, let the proxy pass on Host, see docs/scaling-out.md",
+        headers.get("origin", ""),
+        headers.get("host", ""),
+    )
 
 
 class SecureHeaders:

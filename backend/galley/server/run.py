@@ -141,7 +141,7 @@ class Announcing(uvicorn.Server):
             anywhere = {"0.0.0.0": "127.0.0.1", "::": "::1"}  # noqa: S104
             reached = anywhere.get(host, host)
             shown = f"[{reached}]" if ":" in reached else reached
-            root = f"http://{shown}:{self._port}"
+            root = f"http://{shown}:{self._port}{self._settings.base_path}"
             # Each study's own link: what people are sent begins there, not at the root.
             links = [f"{root}/s/{name}" for name in self._studies]
             sys.stdout.write("".join(f"{url}\n" for url in (root, *links)))

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from galley.errors import GalleyError
+from galley.server.base_path import checked as checked_path
 
 REACHED_AT = re.compile(r"([A-Za-z0-9._-]+|\[[0-9A-Fa-f:.]+\]):[0-9]{1,5}")
 LOG_LEVELS = ("error", "warning", "info", "debug")
@@ -41,6 +42,11 @@ class Settings:
         "",
         "REACHED_AT",
         "HOST:PORT at which other replicas reach this one; empty finds it out. SQLite needs none.",
+    )
+    base_path: str = _row(
+        "",
+        "BASE_PATH",
+        "Sub-path at which a proxy offers the site, such as /kitchen; empty takes `X-Forwarded-Prefix`.",
     )
     study: str = _row("", "STUDY", "The one study to serve; empty serves all of the workspace.")
     think_window_ms: int = _row(
@@ -101,6 +107,8 @@ def _checked(setting: Setting, origin: str, value: Any) -> str | int:
     if setting.low is None or setting.high is None:
         if setting.name == "log_level" and value not in LOG_LEVELS:
             raise GalleyError(f"{origin}: '{value}' is no log level; use one of {', '.join(LOG_LEVELS)}")
+        if setting.name == "base_path":
+            return checked_path(str(value))
         if setting.name == "reached_at" and not REACHED_AT.fullmatch(str(value)):
             raise GalleyError(f"{origin}: '{value}' is no address; write HOST:PORT, such as 10.0.0.7:8000")
         return str(value)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import jinja2
 from jinja2.runtime import Context
 
+from galley.server.base_path import Paths
 from galley.translations import SOURCE, Catalogues, Translator
 
 
@@ -16,6 +17,7 @@ def templates(folder: str) -> jinja2.Environment:
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
+        extensions=[Paths],
     )
 
 

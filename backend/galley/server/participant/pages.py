@@ -16,7 +16,7 @@ from galley.errors import GalleyError
 from galley.records import Store
 from galley.server.clock import Clock
 from galley.server.form_decoding import FormError, read_form
-from galley.server.headers import same_origin
+from galley.server.headers import names_host, same_origin
 from galley.server.limits import Paces, network_of
 from galley.server.participant.step_context import (
     common_context,
@@ -100,6 +100,7 @@ class Pages:
         router.add_api_route("/v/{token}", self.visit, methods=["GET", "HEAD"], **shown)
         router.add_api_route("/v/{token}", self.submit, methods=["POST"], **shown)
         router.add_api_route("/v/{token}/away", self.away, methods=["POST"], response_model=None)
+        router.add_api_route("/v/{token}/play", self.no_socket, methods=["GET"], response_model=None)
         router.add_api_route("/v/{token}/lobby", self.waiting, methods=["GET"], response_model=None)
         return router
 
@@ -225,6 +226,21 @@ class Pages:
             meeting = await self._lobby.see(visit)
         answer = {"waiting": meeting.waiting, "seconds_left": meeting.seconds_left}
         return JSONResponse(answer, 200, NEVER_CACHED)
+
+    async def no_socket(self, request: Request, token: str) -> Response:
+        """What a proxy does not pass on, `host` or `websocket`, for a page whose socket never opened."""
+        if await self._visits.find(token) is None:
+            return Response(status_code=404, headers=NEVER_CACHED)
+        origin, host = request.query_params.get("origin", ""), request.headers.get("host", "")
+        missing = "websocket" if names_host({**request.headers, "origin": origin}) else "host"
+        LOG.warning(
+            "a round's socket does not open: does a proxy not pass on %s? Its page is of %.200r, "
+            "the host asked for is %.200r; see docs/scaling-out.md",
+            "Host" if missing == "host" else "websockets",
+            origin,
+            host,
+        )
+        return JSONResponse({"missing": missing, "origin": origin, "host": host}, 200, NEVER_CACHED)
 
     async def away(self, request: Request, token: str) -> Response:
         """Note that a page was hidden or is seen again; for scripts, which read no answer."""

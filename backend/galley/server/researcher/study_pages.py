@@ -13,6 +13,7 @@ from galley.records.database.tables import STUDY_STATES
 from galley.records.reading import overview
 from galley.records.rows import SessionRow
 from galley.records.store.links_for_tests import LinksForTests
+from galley.server.base_path import site
 from galley.server.participant.visits import TEST_PARAM
 from galley.server.researcher.counts import DAY_MS, arrivals, cell_rows, flag_counts, study_rows
 from galley.server.researcher.downloads import DOWNLOADS
@@ -55,11 +56,11 @@ class StudyPages:
         if state is None:
             return self._context.missing(session, "study")
         study = self._context.studies.get(name)
-        links = [] if study is None else [("Link for participants", f"{request.base_url}s/{name}")]
+        links = [] if study is None else [("Link for participants", f"{site(request)}/s/{name}")]
         kept = () if study is None else study.config.recruitment.keep
         if kept:
             query = "&".join(f"{key}={{{{%{key}%}}}}" for key in kept)
-            links.append(("With a recruiter's parameters", f"{request.base_url}s/{name}?{query}"))
+            links.append(("With a recruiter's parameters", f"{site(request)}/s/{name}?{query}"))
         title = name if study is None else study.title
         tests = () if study is None else await self._test_links(request, study)
         design = () if study is None else cells(study.config)
@@ -84,7 +85,7 @@ class StudyPages:
         return [
             {
                 "token": link.token,
-                "url": f"{request.base_url}s/{study.name}?{TEST_PARAM}={link.token}",
+                "url": f"{site(request)}/s/{study.name}?{TEST_PARAM}={link.token}",
                 "cell": None if link.cell is None else design[min(link.cell, len(design) - 1)],
                 "author": link.author,
                 "expires_ms": link.expires_ms,

@@ -24,7 +24,7 @@ from galley.protocol.messages import (
     Ready,
     Release,
 )
-from galley.server.headers import same_origin
+from galley.server.headers import same_origin, tell_foreign
 from galley.server.limits import Pace, Paces, network_of
 from galley.server.participant.visits import Visits
 from galley.server.rounds.match import LEFT, RESTART
@@ -144,7 +144,11 @@ class Play:
         if self._arrivals.of(token, now_s).wait_s(now_s, patience_s=0.0) > 0:
             await websocket.send_denial_response(Response(status_code=429))
             return
-        if not same_origin(websocket.headers) or await self.visits.find(token) is None:
+        if not same_origin(websocket.headers):
+            tell_foreign(websocket.headers)
+            await websocket.close()
+            return
+        if await self.visits.find(token) is None:
             await websocket.close()
             return
         await websocket.accept()
