@@ -30,6 +30,7 @@ CLOSE_TRIES = 5
 # About 200 MB, or five minutes of 500 rounds, while the database is away.
 MOST_WAITING_ROWS = 1_000_000
 SEEN_EVERY_MS = 10_000
+STALE_S = 5.0
 
 
 @dataclass(slots=True)
@@ -62,6 +63,8 @@ class Writer:
         self._fenced_rows = 0
         self._loss = ""
         self._closing = threading.Event()
+        # When what the thread is at was asked for; later jobs are younger.
+        self._oldest_s: float | None = None
         self._thread = threading.Thread(target=self._run, name="galley-writer", daemon=True)
         self._thread.start()
 
@@ -123,8 +126,14 @@ class Writer:
 
     def health(self) -> Health:
         """How writing fares now."""
+        oldest_s = self._oldest_s
+        waited_s = 0.0 if oldest_s is None else time.monotonic() - oldest_s
         with self._lock:
             message = self._trouble or self._loss
+            if not self._thread.is_alive() and not self._closing.is_set():
+                message = "the writing thread has ended"
+            elif not message and waited_s > STALE_S:
+                message = f"a write has waited for {waited_s:.0f} s"
             return Health(not message, message, self._waiting_rows, self._lost_rows, self._fenced_rows)
 
     def close(self) -> None:
@@ -151,6 +160,7 @@ class Writer:
                 job = self._jobs.get(timeout=self._rest_s())
             except Empty:
                 job = None
+            self._oldest_s = time.monotonic() if job is None else job.born_s
             if job is not None:
                 self._do(job)
             elif self._closing.is_set() and self._jobs.empty():
@@ -158,6 +168,7 @@ class Writer:
             now = time.monotonic()
             if (self._waiting and now >= self._flush_at) or self._due(now):
                 self._flush()
+            self._oldest_s = None
         for _ in range(CLOSE_TRIES):
             if not self._waiting or self._flush():
                 return

@@ -7,17 +7,22 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
-from typing import Literal, TypeVar
+from dataclasses import replace
+from typing import Any, Literal, TypeVar
 
-from sqlalchemy import Connection, Engine
+from sqlalchemy import Connection, Engine, select
+from sqlalchemy.exc import DBAPIError
 
 from galley.files.lock import FileLock
-from galley.records.database.retries import Retries, is_transient
+from galley.records.database.retries import Retries, is_transient, one_line
+from galley.records.database.tables import VISITS
 from galley.records.database.writer import Writer
 from galley.records.rows import Health
 
 T = TypeVar("T")
 READERS = 2
+STALE_S = 10.0
+"""A question that waits for so long, or failed so short a time ago, is a matter of health."""
 
 
 class StoreBase:
@@ -39,6 +44,8 @@ class StoreBase:
         self._retry_for_s = retry_for_s
         self._closing = threading.Event()
         self._writer = Writer(engine, flush_s, retry_for_s)
+        self._asked: dict[Future[Any], float] = {}
+        self._failed: tuple[float, str] | None = None
         self._readers = ThreadPoolExecutor(READERS, thread_name_prefix="galley-reader")
 
     @property
@@ -73,9 +80,19 @@ class StoreBase:
                 except Exception as error:
                     if is_transient(error) and retries.wait():
                         continue
+                    if isinstance(error, DBAPIError):
+                        self._failed = (time.monotonic(), one_line(error))
                     raise retries.failure(error) from None
 
-        return self._readers.submit(run)
+        answer = self._readers.submit(run)
+        self._asked[answer] = time.monotonic()
+        answer.add_done_callback(lambda done: self._asked.pop(done, None))
+        return answer
+
+    def probe(self) -> None:
+        """Ask the database something, unless a question waits already, so that `health` can tell."""
+        if not self._asked and not self._closing.is_set():
+            self.read(lambda connection: connection.execute(select(VISITS.c.id).limit(1)).all())
 
     @contextmanager
     def reading(self) -> Iterator[Connection]:
@@ -93,8 +110,16 @@ class StoreBase:
         return self._writer.flush()
 
     def health(self) -> Health:
-        """Whether what is journalled reaches the database."""
-        return self._writer.health()
+        """Whether what is journalled reaches the database, and questions are answered."""
+        health = self._writer.health()
+        now_s = time.monotonic()
+        message = ""
+        if self._failed is not None and now_s - self._failed[0] < STALE_S:
+            message = f"a question failed: {self._failed[1]}"
+        waited_s = now_s - min(list(self._asked.values()), default=now_s)
+        if waited_s > STALE_S:
+            message = f"a question has waited for {waited_s:.0f} s"
+        return replace(health, ok=False, message=message) if health.ok and message else health
 
     def close(self) -> None:
         """Write what waits, then let go of the database; a second call does nothing.

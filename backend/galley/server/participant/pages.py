@@ -116,6 +116,7 @@ class Pages:
 
     async def health(self) -> Response:
         """Whether what happens reaches the database."""
+        self._store.probe()
         health = self._store.health()
         state = {"ok": health.ok, "rounds": len(self._matches), "rows_waiting": health.waiting_rows}
         return JSONResponse(state, 200 if health.ok else 503, NEVER_CACHED)
