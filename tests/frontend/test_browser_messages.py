@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from galley.protocol import kinds, messages
+from galley.protocol import field_kinds, messages
 from tests.frontend.pages import FRONTEND
 
 TEXT = (FRONTEND / "js/messages.js").read_text(encoding="utf-8")
@@ -41,9 +41,9 @@ def test_types_are_those_of_the_table() -> None:
 
 
 def test_words_are_those_of_the_table() -> None:
-    assert _list("KEYS") == list(kinds.KEYS)
-    assert _union("ReleaseReason") == list(kinds.RELEASE_REASONS)
-    assert _union("Phase") == list(kinds.PHASES)
+    assert _list("KEYS") == list(field_kinds.KEYS)
+    assert _union("ReleaseReason") == list(field_kinds.RELEASE_REASONS)
+    assert _union("Phase") == list(field_kinds.PHASES)
     assert f"PROTOCOL = {messages.PROTOCOL};" in TEXT
 
 

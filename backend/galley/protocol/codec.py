@@ -8,7 +8,7 @@ from typing import Any
 
 import orjson
 
-from galley.protocol.kinds import CHOICES, holds
+from galley.protocol.field_kinds import CHOICES, holds
 from galley.protocol.messages import CLIENT, MAX_MESSAGE_CHARS, SERVER, Incoming, Message, Outgoing
 
 

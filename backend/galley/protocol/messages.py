@@ -1,6 +1,6 @@
 """The messages between browser and round: a type for each, from which the table is made that all else reads.
 
-A field says its kind (galley.protocol.kinds) and what it means. docs/protocol.md, the checks of both
+A field says its kind (galley.protocol.field_kinds) and what it means. docs/protocol.md, the checks of both
 directions, the simulated participant and the tests of the browser's own copy go by this table.
 """
 
@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Final, Literal, TypedDict, get_type_hints
 
-from galley.protocol.kinds import (
+from galley.protocol.field_kinds import (
     CHOICES,
     Chefs,
     Events,
@@ -209,7 +209,7 @@ Outgoing = Keyframe | Countdown | Tick | Paused | Ended | Pong | Elsewhere | Ref
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """One field of a message: name, kind (one of galley.protocol.kinds) and what it says."""
+    """One field of a message: name, kind (one of galley.protocol.field_kinds) and what it says."""
 
     name: str
     kind: str

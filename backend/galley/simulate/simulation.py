@@ -54,8 +54,9 @@ class Simulation:
 def simulate(workspace: Workspace, simulation: Simulation, url: str | None = None) -> dict[str, Any]:
     """The report of a simulation; without a URL it has a server and records of its own, gone at the end.
 
-    Raises: GalleyError or InvalidFiles when the workspace has no such study or agent, or the server cannot be
-    reached.
+    Raises:
+        GalleyError: the workspace has no such study or agent, or the server cannot be reached.
+        InvalidFiles: a file of the workspace cannot be used.
     """
     study = load_study(workspace, simulation.study)
     world = _world(workspace, study, simulation)
@@ -138,7 +139,8 @@ def _params(study: Study, seed: int, number: int) -> dict[str, str]:
 def own_server(workspace: Workspace, study: str) -> Iterator[str]:
     """The URL of a server in a process of its own, with a database that is gone when the block ends.
 
-    Raises: GalleyError with what the server said when it does not start.
+    Raises:
+        GalleyError: it does not start; with what it said.
     """
     with tempfile.TemporaryDirectory(prefix="galley-simulate-") as folder:
         log = Path(folder) / "log"

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from galley.kitchen import EAST, INTERACT, NORTH, SOUTH, STAY, WEST
-from galley.protocol.kinds import KEYS
+from galley.protocol.field_kinds import KEYS
 from galley.server.rounds.key_state import ACTION_OF_KEY, MAX_WAITING, KeyState
 
 

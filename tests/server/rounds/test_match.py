@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from galley.kitchen import EAST, INTERACT, NORTH, STAY, WEST
-from galley.protocol import codec, kinds, messages
+from galley.protocol import codec, field_kinds, messages
 from galley.server.clock import Stagger, first_deadline
 from galley.server.rounds.thinking import Answer
 from tests.server.rounds.live_round import TICK_S, Loop, Round, Tab, run, until_tick
@@ -394,7 +394,7 @@ def test_every_message_of_the_server_is_as_the_table_says() -> None:
             seen.add(row.name)
             assert set(message) == {field.name for field in row.fields}
             for field in row.fields:
-                assert kinds.holds(field.kind, message[field.name]), (
+                assert field_kinds.holds(field.kind, message[field.name]), (
                     row.name,
                     field.name,
                     message[field.name],

@@ -10,7 +10,7 @@ import pytest
 from galley.kitchen import EAST, NORTH, STAY, WEST, Kitchen, Layout
 from galley.protocol import messages
 from galley.records import Lease, LeaseLost
-from galley.server.rounds.match import MAX_ABSENCES
+from galley.records.store.absences import MOST_ABSENCES
 from galley.server.rounds.takeover import caught_up
 from tests.server.rounds.live_round import LAYOUT, Round, Tab, run, until_tick
 
@@ -117,10 +117,10 @@ def test_a_page_that_flickers_is_not_recorded_without_end() -> None:
         round_.join(Tab())
         round_.ready()
         await until_tick(round_, 2)
-        for _ in range(500):
+        for _ in range(MOST_ABSENCES + 50):
             round_.release("hidden")
             round_.release("shown")
-        assert len(round_.away) == 2 * MAX_ABSENCES
+        assert len(round_.away) == 2 * MOST_ABSENCES
 
     run(test())
 

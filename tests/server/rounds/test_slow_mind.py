@@ -12,8 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from galley.kitchen import EAST, NORTH, STAY, WEST, Layout
-from galley.server.rounds.slow_mind import SlowMind
-from galley.server.rounds.thinking import Mind, Question, Thinking
+from galley.server.rounds.thinking import Mind, Question, SlowMind, Thinking
 from tests.server.helpers import wait_until
 from tests.server.rounds.test_thinking import Scripted, answered
 

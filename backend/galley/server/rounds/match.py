@@ -10,24 +10,17 @@ from typing import Any
 
 from galley.kitchen import STAY
 from galley.outcomes import RoundOutcome
+from galley.protocol import messages
 from galley.protocol.codec import MessageError, encode
-from galley.protocol.keyframes import keyframe
-from galley.protocol.messages import (
-    CLOSE_BUSY,
-    CLOSE_ENDED,
-    CLOSE_REPLACED,
-    Key,
-    Outgoing,
-    Ping,
-    Release,
-)
-from galley.protocol.scene import Scene, event_rows
+from galley.protocol.scene import Scene
 from galley.records import LeaseLost, PauseRow
-from galley.server.clock import Clock, first_deadline
+from galley.records.store.absences import MOST_ABSENCES
+from galley.server.clock import Clock, Deadlines, Timer
 from galley.server.rounds.episodes import Course
 from galley.server.rounds.match_host import MatchHost
 from galley.server.rounds.person import Connection, Person
 from galley.server.rounds.round_journal import Handed, Played, RoundJournal
+from galley.server.rounds.round_messages import round_end, round_keyframe, round_tick
 from galley.server.rounds.round_spec import RoundSpec
 from galley.server.rounds.thinking import Mind, Question
 
@@ -35,8 +28,6 @@ LOG = logging.getLogger(__name__)
 LEFT = "left"
 RESTART = "restart"
 PARTNER = "partner"
-MAX_ABSENCES = 200
-"""So many a person and round are recorded: each is a write of its own."""
 
 
 class Match:
@@ -72,19 +63,16 @@ class Match:
         self._clock = clock
         self._host = host
         self._loop = asyncio.get_running_loop()
-        self._tick_s = spec.tick_ms / 1000.0
-        self._stagger = stagger
-        self._timer: asyncio.TimerHandle | None = None
-        self._absence: asyncio.TimerHandle | None = None
+        self._deadlines = Deadlines(spec.tick_ms / 1000.0, stagger)
+        self._timer = Timer()
+        self._absence = Timer()
         self._give_up_at_s = 0.0
-        self._start_s = 0.0
-        self._start_tick = course.ticks
         self._pause: PauseRow | None = None
         self._ending: asyncio.Task[None] | None = None
         self._replacing: asyncio.Task[None] | None = None
         if course.between:
             course.next_episode()
-        self._state = course.kitchen.state.copy()
+        self.state = course.kitchen.state.copy()
         self._questions: dict[int, Question] = {}
         if course.over:
             self.end("finished")
@@ -113,7 +101,7 @@ class Match:
         if older is not None:
             if older.tab != connection.tab:
                 older.send(encode({"type": "elsewhere"}))
-            older.close(CLOSE_REPLACED)
+            older.close(messages.CLOSE_REPLACED)
             self.leave(older)
         person.connection = connection
         if self.phase == "waiting":
@@ -131,7 +119,7 @@ class Match:
         if self.under_way:
             self._stand_still(reason)
         elif self.phase in ("waiting", "countdown"):
-            self._cancel_timer()
+            self._timer.cancel()
             if self.phase == "countdown":
                 self.phase = "waiting"
                 for other in self.people:
@@ -145,24 +133,13 @@ class Match:
         """Send a person the whole picture and what belongs to the phase."""
         if not person.here:
             return
-        course = self.course
-        person.send(
-            keyframe(
-                self.scene,
-                self.spec.view(person, course.episodes),
-                self._state,
-                phase=self.phase,
-                tick=course.kitchen.tick,
-                episode=course.episode,
-                score_before=course.score_before,
-            )
-        )
+        person.send(round_keyframe(self, person))
         if self.phase == "paused" and self._pause is not None:
             left_s = max(0, math.ceil(self._give_up_at_s - self._loop.time()))
             reason = PARTNER if person.ready else self._pause.reason
             person.send({"type": "paused", "reason": reason, "seconds_left": left_s})
         elif self._ending is not None and self._ending.done():
-            self._say_ended(person)
+            person.send(round_end(self, person))
 
     def ready(self, person: Person) -> None:
         """Begin the countdown once all are ready.
@@ -182,7 +159,7 @@ class Match:
         else:
             self.show(person)
 
-    def key(self, person: Person, message: Key, arrival_s: float) -> None:
+    def key(self, person: Person, message: messages.Key, arrival_s: float) -> None:
         """A key went down or up.
 
         Raises:
@@ -197,19 +174,19 @@ class Match:
             person.keys.let_go(message.key)
         self.journal.key(message, arrival_s, self.course.ticks, person.seat)
 
-    def release(self, person: Person, message: Release, arrival_s: float) -> None:
+    def release(self, person: Person, message: messages.Release, arrival_s: float) -> None:
         """All keys were let go; outside of play there is none to let go of."""
         if message.reason == "shown":
             self._in_sight(person)
         if self.phase in ("countdown", "playing"):
-            if message.reason == "hidden" and person.hidden_ms is None and person.absences < MAX_ABSENCES:
+            if message.reason == "hidden" and person.hidden_ms is None and person.absences < MOST_ABSENCES:
                 person.absences += 1
                 person.hidden_ms = self._clock.ms(arrival_s)
                 self._host.hidden(self, person, person.hidden_ms, None)
             person.keys.let_go_all()
             self.journal.key(message, arrival_s, self.course.ticks, person.seat)
 
-    def ping(self, person: Person, message: Ping, arrival_s: float) -> None:
+    def ping(self, person: Person, message: messages.Ping, arrival_s: float) -> None:
         """Answer a ping and note it."""
         server_ms = self._clock.ms(arrival_s)
         person.send({"type": "pong", "client_ms": message.client_ms, "server_ms": server_ms})
@@ -225,10 +202,10 @@ class Match:
 
     def deadline(self, tick: int) -> float:
         """When a tick of the round is due while playing, in seconds of the event loop's clock."""
-        return self._start_s + (tick - self._start_tick) * self._tick_s
+        return self._deadlines.of(tick)
 
     def _count_down(self) -> None:
-        self._cancel_absence()
+        self._absence.cancel()
         for person in self.people:
             person.keys.clear()
         self.phase = "countdown"
@@ -238,19 +215,18 @@ class Match:
     def _count(self, seconds: int) -> None:
         if seconds > 0:
             self._send_all({"type": "countdown", "seconds": seconds})
-            self._timer = self._loop.call_later(1.0, self._count, seconds - 1)
+            self._timer.set(self._loop.time() + 1.0, self._count, seconds - 1)
             return
         for person in self.people:
             person.keys.forget_waiting()
         self.phase = "playing"
-        self._start_tick = self.course.ticks
         # The first tick is due a whole tick from now at the earliest, so that keys can reach it.
-        self._start_s = first_deadline(self._loop.time() + self._tick_s, self._stagger, self._tick_s)
+        self._deadlines.begin(self._loop.time(), self.course.ticks)
         if self._pause is not None:
             self.journal.goes_on(self._pause)
             self._pause = None
         self._show_all()
-        self._timer = self._loop.call_at(self._start_s, self._tick)
+        self._timer.set(self.deadline(self.course.ticks), self._tick)
 
     def _tick(self) -> None:
         if self.journal.lost:
@@ -275,17 +251,10 @@ class Match:
                 if answer.action is not None:
                     actions[seat] = answer.action
         joint = (actions[0], actions[1])
-        before = self._state
+        before = self.state
         course.step(*joint)
-        after = self._state = course.kitchen.state.copy()
-        text = encode(
-            {
-                "type": "tick",
-                "tick": course.kitchen.tick,
-                "events": event_rows(course.kitchen.events),
-                **self.scene.changes(before, after, course.score_before),
-            }
-        )
+        self.state = course.kitchen.state.copy()
+        text = encode(round_tick(self, before))
         handed = Handed()
         for person in people:
             if person.connection is not None:
@@ -294,7 +263,7 @@ class Match:
         self.journal.played(played)
         if not course.kitchen.done:
             self._ask((before, joint))
-            self._timer = self._loop.call_at(self.deadline(tick + 1), self._tick)
+            self._timer.set(self.deadline(tick + 1), self._tick)
         elif course.over:
             self.end("finished")
         else:
@@ -302,7 +271,7 @@ class Match:
 
     def _next_episode(self) -> None:
         self.course.next_episode()
-        self._state = self.course.kitchen.state.copy()
+        self.state = self.course.kitchen.state.copy()
         for seat, player in enumerate(self.players):
             if not isinstance(player, Person):
                 player.restart(self.course.layout, seat, self.spec.seeds[self.course.episode - 1])
@@ -313,7 +282,7 @@ class Match:
 
     def _ask(self, seen: Any) -> None:
         self._questions = {
-            seat: player.ask(self.course.kitchen.tick, self._state, seen)
+            seat: player.ask(self.course.kitchen.tick, self.state, seen)
             for seat, player in enumerate(self.players)
             if not isinstance(player, Person)
         }
@@ -321,7 +290,7 @@ class Match:
     # ---- waiting for people --------------------------------------------------------------------------------
 
     def _stand_still(self, reason: str) -> None:
-        self._cancel_timer()
+        self._timer.cancel()
         self.journal.write()
         self.phase = "paused"
         for person in self.people:
@@ -336,19 +305,17 @@ class Match:
     def _await(self) -> None:
         """Before the first tick: wait so long for the other when one is ready, or for anybody to come."""
         someone_ready = any(person.ready for person in self.people)
-        if someone_ready and self._absence is not None and all(person.here for person in self.people):
+        if someone_ready and self._absence.runs and all(person.here for person in self.people):
             return
-        self._cancel_absence()
+        self._absence.cancel()
         if someone_ready or not any(person.here for person in self.people):
             self._wait_for(self.spec.abandon_after_s)
 
     def _wait_for(self, seconds: float) -> None:
-        self._cancel_absence()
         self._give_up_at_s = self._loop.time() + seconds
-        self._absence = self._loop.call_at(self._give_up_at_s, self._give_up)
+        self._absence.set(self._give_up_at_s, self._give_up)
 
     def _give_up(self) -> None:
-        self._absence = None
         if self.journal.lost:
             self.lose()
         elif self.phase == "paused" or any(person.ready for person in self.people):
@@ -391,7 +358,7 @@ class Match:
             self._replacing = None
         if self.phase == "ended":
             return
-        person.close(CLOSE_ENDED)
+        person.close(messages.CLOSE_ENDED)
         self.players[person.seat] = mind
         self._ask(None)
         if all(one.ready and one.here for one in self.people):
@@ -434,17 +401,10 @@ class Match:
         except Exception:  # the round is in the journal; opening the page again tries to close it again
             LOG.exception("round %d could not be closed", self.spec.round_id)
             for person in self.people:
-                person.close(CLOSE_ENDED)
+                person.close(messages.CLOSE_ENDED)
             return
         for person in self.people:
-            self._say_ended(person)
-
-    def _say_ended(self, person: Person) -> None:
-        left = bool(self.left) and person not in self.left
-        outcome = "partner_left" if left else str(self.outcome)
-        person.send(
-            {"type": "ended", "outcome": outcome, "score": self.course.score, "next": person.next_url}
-        )
+            person.send(round_end(self, person))
 
     def lose(self) -> None:
         """Stop: another process has the round now, and this one's people with it."""
@@ -454,7 +414,7 @@ class Match:
         for person in self.people:
             if alone:
                 person.send({"type": "elsewhere"})
-            person.close(CLOSE_REPLACED if alone else CLOSE_BUSY)
+            person.close(messages.CLOSE_REPLACED if alone else messages.CLOSE_BUSY)
         self._host.forget(self)
 
     def stop(self) -> None:
@@ -471,7 +431,7 @@ class Match:
 
     # ---- small parts ---------------------------------------------------------------------------------------
 
-    def _send_all(self, message: Outgoing) -> None:
+    def _send_all(self, message: messages.Outgoing) -> None:
         for person in self.people:
             person.send(message)
 
@@ -479,16 +439,6 @@ class Match:
         for person in self.people:
             self.show(person)
 
-    def _cancel_timer(self) -> None:
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
-
-    def _cancel_absence(self) -> None:
-        if self._absence is not None:
-            self._absence.cancel()
-            self._absence = None
-
     def _cancel_both(self) -> None:
-        self._cancel_timer()
-        self._cancel_absence()
+        self._timer.cancel()
+        self._absence.cancel()

@@ -28,9 +28,8 @@ from galley.server.rounds.person import Person
 from galley.server.rounds.round_journal import RoundJournal
 from galley.server.rounds.round_spec import RoundSpec
 from galley.server.rounds.set_up import of_one, of_two
-from galley.server.rounds.slow_mind import SlowMind
 from galley.server.rounds.takeover import caught_up, ready_agent
-from galley.server.rounds.thinking import Mind, Thinking
+from galley.server.rounds.thinking import Mind, SlowMind, Thinking
 from galley.study.stages.round_step import RoundStep
 from galley.study.visit.happenings import RoundEnded
 
@@ -113,7 +112,8 @@ class Matches:
     async def of(self, visit: Visit) -> Place | None:
         """The place in the round that a visit is at; None when it is at none, or its round is over already.
 
-        Raises: RoundBusy when another process has the round and keeps it.
+        Raises:
+            RoundBusy: another process has the round and keeps it.
         """
         step = visit.round
         if not visit.active or step is None:

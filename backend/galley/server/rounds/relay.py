@@ -91,7 +91,8 @@ async def _down(there: ClientConnection, websocket: WebSocket) -> None:
 async def hand_over(address: str, path: str, form: Mapping[str, Sequence[str]]) -> None:
     """Return once the process at `address` has used a form.
 
-    Raises: GalleyError if it cannot be reached or did not use it.
+    Raises:
+        GalleyError: it cannot be reached or did not use it.
     """
     fields = {name: list(values) for name, values in form.items()}
     try:

@@ -14,7 +14,7 @@ from galley.server.clock import Clock
 PING_STORED_EVERY_S = 1.0
 
 
-class Keeper(Protocol):
+class JournalStore(Protocol):
     """The part of the store that a round writes to; returns at once."""
 
     def journal(
@@ -58,8 +58,8 @@ class Played:
 class RoundJournal:
     """Writes one round's rows to the store, for as long as the round is this process's by its lease."""
 
-    def __init__(self, keeper: Keeper, clock: Clock, round_id: int, lease: Lease | None = None) -> None:
-        self._keeper = keeper
+    def __init__(self, store: JournalStore, clock: Clock, round_id: int, lease: Lease | None = None) -> None:
+        self._store = store
         self._clock = clock
         self._round_id = round_id
         self.lease = lease
@@ -92,28 +92,28 @@ class RoundJournal:
             late=last.late,
             fault=last.fault,
         )
-        self._keeper.journal(self._round_id, ticks=[row], lease=self.lease)
+        self._store.journal(self._round_id, ticks=[row], lease=self.lease)
 
     def key(self, message: Key | Release, arrival_s: float, tick: int, seat: int) -> None:
         """Note a key event at a seat and the first tick it can act on."""
         key, down = (message.key, message.down) if isinstance(message, Key) else ("release", False)
         row = KeyRow(message.seq, key, down, message.client_ms, self._clock.ms(arrival_s), tick, seat)
-        self._keeper.journal(self._round_id, keys=[row], lease=self.lease)
+        self._store.journal(self._round_id, keys=[row], lease=self.lease)
 
     def pause(self, tick: int, reason: str) -> PauseRow:
         """Note that the kitchen stands still from now on."""
         row = PauseRow(tick, self._clock.ms(), None, reason)
-        self._keeper.journal(self._round_id, pauses=[row], lease=self.lease)
+        self._store.journal(self._round_id, pauses=[row], lease=self.lease)
         return row
 
     def goes_on(self, pause: PauseRow) -> None:
         """Note that a pause is over now."""
         row = PauseRow(pause.tick, pause.started_ms, self._clock.ms(), pause.reason)
-        self._keeper.journal(self._round_id, pauses=[row], lease=self.lease)
+        self._store.journal(self._round_id, pauses=[row], lease=self.lease)
 
     def ping(self, ping: Ping, arrival_s: float, seat: int) -> None:
         """Note a ping, at most one a second of each seat."""
         if arrival_s - self._last_ping_s[seat] >= PING_STORED_EVERY_S:
             self._last_ping_s[seat] = arrival_s
             row = ClockRow(ping.client_ms, self._clock.ms(arrival_s), ping.rtt_ms, seat)
-            self._keeper.journal(self._round_id, clocks=[row], lease=self.lease)
+            self._store.journal(self._round_id, clocks=[row], lease=self.lease)
