@@ -92,6 +92,9 @@ export function boardFrom(frame, you = "") {
   };
 }
 
+/** How far a move is at a share of its tick; films draw it the same. @param {number} t 0 to 1 */
+export const eased = (t) => 0.65 * t + 0.35 * t * t * (3 - 2 * t);
+
 /**
  * Where a chef is seen, in tiles: its move eases over one tick.
  * @param {Chef} chef @param {number} now @param {number} tickMs
@@ -99,8 +102,7 @@ export function boardFrom(frame, you = "") {
  */
 export function seenAt(chef, now, tickMs) {
   const t = Math.min(1, Math.max(0, (now - chef.movedAt) / tickMs));
-  const eased = 0.65 * t + 0.35 * t * t * (3 - 2 * t);
-  return [chef.fromX + (chef.x - chef.fromX) * eased, chef.fromY + (chef.y - chef.fromY) * eased];
+  return [chef.fromX + (chef.x - chef.fromX) * eased(t), chef.fromY + (chef.y - chef.fromY) * eased(t)];
 }
 
 /**

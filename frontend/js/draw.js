@@ -2,7 +2,7 @@
 
 import { cellOf, seenAt } from "./board.js";
 import { drawEffect } from "./effects.js";
-import { isFloor, middle, wallOf } from "./kitchen.js";
+import { isFloor, middle, wallOf } from "./backdrop.js";
 import { TOWARDS, breath, bump, calm, gait, pop, pulse } from "./motion.js";
 import { drawPot } from "./pots.js";
 import { CHEF_SIZE, THINGS } from "./sprites.js";
@@ -11,6 +11,8 @@ import { CHEF_SIZE, THINGS } from "./sprites.js";
 /** @typedef {import("./board.js").Chef} Chef */
 /** @typedef {import("./sprites.js").Sprites} Sprites */
 /** @typedef {CanvasRenderingContext2D} Context */
+
+/** @typedef {{context: Context, board: Board, sprites: Sprites, now: number, quiet: boolean}} Frame one frame being drawn */
 
 /** Where a chef stands in its cell; where the feet are in its drawing; how much smaller than drawn, so that a hat hides little. */
 const STAND = 0.9;
@@ -28,7 +30,7 @@ const HELD_SIZE = 0.86;
  * Draws one frame.
  * @param {Context} context of a canvas as large as `kitchen`
  * @param {Board} board @param {Sprites} sprites
- * @param {HTMLCanvasElement} kitchen made by `kitchen.still`
+ * @param {HTMLCanvasElement} kitchen made by `backdrop.still`
  * @param {number} now ms of performance.now()
  */
 export function draw(context, board, sprites, kitchen, now) {
@@ -52,7 +54,7 @@ export function draw(context, board, sprites, kitchen, now) {
   board.chefs.forEach((chef, seat) => {
     if (board.alone && seat !== board.seat) return;
     const [x, y] = seen[seat] ?? [chef.x, chef.y];
-    layers.push([y + 0.5, () => drawChef(context, board, chef, seat, x, y, sprites, now, quiet)]);
+    layers.push([y + 0.5, () => drawChef({ context, board, sprites, now, quiet }, seat, x, y)]);
   });
   layers.sort((a, b) => a[0] - b[0]);
   for (const [, layer] of layers) layer();
@@ -81,9 +83,9 @@ function drawThing(context, sprites, thing, x, y, scale) {
   context.drawImage(sprites.get(name), (x - (w / 2) * scale) * s, (y - (h / 2) * scale) * s, w * scale * s, h * scale * s);
 }
 
-/** @param {Context} context @param {Board} board @param {Chef} chef @param {number} seat @param {number} x @param {number} y
- * @param {Sprites} sprites @param {number} now @param {boolean} quiet */
-function drawChef(context, board, chef, seat, x, y, sprites, now, quiet) {
+/** @param {Frame} frame @param {number} seat @param {number} x where it is seen, in tiles @param {number} y */
+function drawChef({ context, board, sprites, now, quiet }, seat, x, y) {
+  const chef = board.chefs[/** @type {0 | 1} */ (seat)];
   const s = sprites.tile;
   const { lift, lean } = quiet ? { lift: 0, lean: 0 } : gait(chef, now, board.tickMs);
   const [fx, fy] = [(x + 0.5) * s, (y + STAND) * s];

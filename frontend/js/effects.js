@@ -1,7 +1,7 @@
 /** Draws what flies up for a moment: points for a delivery, sparks, splashes. */
 
 import { EFFECT_MS } from "./board.js";
-import { WALL, middle } from "./kitchen.js";
+import { WALL, middle } from "./backdrop.js";
 import { share } from "./motion.js";
 
 /** @typedef {import("./board.js").Board} Board */

@@ -2,7 +2,8 @@
 
 import { boardFrom } from "./board.js";
 import { draw } from "./draw.js";
-import { still } from "./kitchen.js";
+import { still } from "./backdrop.js";
+import { stillFrame } from "./messages.js";
 import { HATS, Sprites, loadImages, newCanvas } from "./sprites.js";
 import { tileFor } from "./view.js";
 
@@ -54,11 +55,7 @@ function redraw(figure, images) {
   const busy = figure.dataset.scene === "busy";
   const pots = potsOf(grid, busy);
   if (busy) Object.assign(chefs, { 0: [chefs[0][0], chefs[0][1], 2, 1], 1: [chefs[1][0], chefs[1][1], 1, 4] });
-  draw(context, boardFrom({
-    type: "keyframe", phase: "waiting", tick: 99, horizon: 99, tick_ms: 150, seat: 0, hats, grid, cook_time: 20, chefs,
-    things: [], pots, score: 0, goal: null, round: 1, of: 1, tutorial: false, orders: null,
-    episode: 1, episodes: 1, partner: "agent", input_mode: "hold", show_score: "during", points: 20,
-  }, document.body.dataset.you ?? ""), sprites, kitchen, 0);
+  draw(context, boardFrom(stillFrame(grid, chefs, pots, hats), document.body.dataset.you ?? ""), sprites, kitchen, 0);
   canvas.className = "kitchen-canvas";
   canvas.setAttribute("role", "img");
   canvas.setAttribute("aria-label", tiles.getAttribute("aria-label") ?? "");

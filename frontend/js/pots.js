@@ -1,6 +1,6 @@
 /** Draws a pot on its stove: flames, contents, progress ring, steam and the sign that it is ready. */
 
-import { middle } from "./kitchen.js";
+import { middle } from "./backdrop.js";
 import { pulse, share } from "./motion.js";
 
 /** @typedef {import("./board.js").Board} Board */

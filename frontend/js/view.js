@@ -2,7 +2,7 @@
 
 import { inMotion } from "./board.js";
 import { draw } from "./draw.js";
-import { WALL, still } from "./kitchen.js";
+import { WALL, still } from "./backdrop.js";
 import { Sprites, newCanvas } from "./sprites.js";
 
 /** @typedef {import("./board.js").Board} Board */

@@ -13,7 +13,7 @@ from galley.workspace import frontend_folder
 
 FOLDER = frontend_folder()
 FILES = {
-    "kitchen.js": ("WALL", "CORNER"),
+    "backdrop.js": ("WALL", "CORNER"),
     "sprites.js": ("FACINGS", "THINGS", "STATIONS", "SIZES", "CHEF_SIZE", "HAT_BOX"),
     "draw.js": ("STAND", "FEET", "SHRINK", "HANDS", "HELD_SIZE"),
     "motion.js": ("TOWARDS", "BUMP_MS", "BUMP_TILES", "BOB_TILES"),

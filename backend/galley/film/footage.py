@@ -100,10 +100,10 @@ class Reel:
         views, events = self._views[episode], self._events[episode]
         was, now = views[tick], views[min(tick + 1, len(views) - 1)]
         tick_ms = self._footage.tick_ms
-        eased = 0.65 * share + 0.35 * share * share * (3 - 2 * share)
+        done = eased(share)
         seen, lifts = [], []
         for seat, (old, new) in enumerate(zip(was.chefs, now.chefs, strict=True)):
-            x, y = old.x + (new.x - old.x) * eased, old.y + (new.y - old.y) * eased
+            x, y = old.x + (new.x - old.x) * done, old.y + (new.y - old.y) * done
             walks = (old.x, old.y) != (new.x, new.y)
             lifts.append(BOB_TILES * math.sin(math.pi * share) if walks else 0.0)
             hits = [e.tick for e in events if e.seat == seat and e.kind == "blocked" and e.tick <= tick]
@@ -136,6 +136,11 @@ class Reel:
             before += views[-1].score
         tick = min(int(ticks), length)
         return number, tick, ticks - tick, before
+
+
+def eased(share: float) -> float:
+    """How far a move is at a share of its tick, both 0 to 1; board.js draws it the same."""
+    return 0.65 * share + 0.35 * share * share * (3 - 2 * share)
 
 
 def _bump(ms: float) -> float:

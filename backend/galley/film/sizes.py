@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Final
 
-# kitchen.js
+# backdrop.js
 WALL: Final = 0.4
 CORNER: Final = 0.17
 
