@@ -42,8 +42,12 @@ MAX_MESSAGE_CHARS: Final = 1024
 CLOSE_REPLACED: Final = 4001
 CLOSE_ENDED: Final = 4002
 CLOSE_REFUSED: Final = 4003
+# Of the registry of RFC 6455:
+CLOSE_NORMAL: Final = 1000
+CLOSE_RESTART: Final = 1012
+"""The server is going down; browsers cannot send it."""
 CLOSE_BUSY: Final = 1013
-"""RFC 6455 registry: try again later."""
+"""Try again later."""
 
 
 # ---- from the browser --------------------------------------------------------------------------------

@@ -15,7 +15,7 @@ from galley.records import ClockRow, KeyRow, Lease, PauseRow, TickRow
 from galley.server.clock import Clock
 from galley.server.rounds.match import Match
 from galley.server.rounds.person import Person
-from galley.server.rounds.round_journal import Handed, RoundJournal
+from galley.server.rounds.round_journal import RoundJournal, SentAt
 from galley.server.rounds.round_spec import RoundSpec
 from galley.server.rounds.takeover import caught_up
 from galley.server.rounds.thinking import Answer
@@ -65,13 +65,13 @@ class Tab:
         self.closed: int | None = None
         self._slow_s = slow_s
 
-    def send(self, text: str, handed: Handed | None = None) -> None:
+    def send(self, text: str, sent_at: SentAt | None = None) -> None:
         self.messages.append(parse_outgoing(text))
-        if handed is not None:
+        if sent_at is not None:
             loop = asyncio.get_running_loop()
 
             def hand() -> None:
-                handed.at_s = loop.time()
+                sent_at.at_s = loop.time()
 
             loop.call_later(self._slow_s, hand)
 
@@ -149,7 +149,7 @@ class Round:
         **spec: Any,
     ) -> None:
         layout = Layout.from_ascii("test", LAYOUT, horizon_ticks=horizon)
-        self.course = caught_up(layout, episodes, np.array(played, dtype=np.uint8).reshape(-1, 2))
+        self.round_kitchen = caught_up(layout, episodes, np.array(played, dtype=np.uint8).reshape(-1, 2))
         self.kept = Kept()
         self.mind = Answering(decide)
         self.ends: list[str] = []
@@ -161,7 +161,7 @@ class Round:
         settings = {"seeds": (1,) * episodes, **spec}
         self.match = Match(
             RoundSpec(7, 150, 160, 1, 2, False, countdown_s, 60, **settings),
-            self.course,
+            self.round_kitchen,
             (self.person, self.other if people == 2 else self.mind),  # type: ignore[arg-type]
             RoundJournal(self.kept, Ticking(), 7),
             Ticking(),
@@ -187,7 +187,7 @@ class Round:
 
     @property
     def kitchen(self) -> Kitchen:
-        return self.course.kitchen
+        return self.round_kitchen.kitchen
 
     def join(self, tab: Tab) -> None:
         self.match.join(self.person, tab)

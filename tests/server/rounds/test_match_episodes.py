@@ -60,12 +60,12 @@ def test_a_round_is_taken_up_in_the_episode_where_it_was() -> None:
 
 def test_the_last_state_of_a_round_left_between_episodes_is_of_the_one_that_was_played() -> None:
     layout = Layout.from_ascii("test", LAYOUT, horizon_ticks=3)
-    course = caught_up(layout, 2, np.array([[EAST, STAY]] * 3, dtype=np.uint8))
-    assert (course.episode, course.kitchen.tick) == (2, 0)
+    round_kitchen = caught_up(layout, 2, np.array([[EAST, STAY]] * 3, dtype=np.uint8))
+    assert (round_kitchen.episode, round_kitchen.kitchen.tick) == (2, 0)
     alone = Kitchen(layout)
     for _ in range(3):
         alone.step(EAST, STAY)
-    assert course.last_state.tolist() == alone.state.tolist()
+    assert round_kitchen.last_state.tolist() == alone.state.tolist()
 
 
 def test_in_press_mode_every_press_is_one_action() -> None:

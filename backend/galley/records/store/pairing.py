@@ -1,4 +1,4 @@
-"""Who waits for another person to play with; whichever server hears of the second one pairs the two."""
+"""The rows of those who wait for another person, and the one transaction that pairs two of them."""
 
 from __future__ import annotations
 

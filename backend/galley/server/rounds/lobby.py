@@ -1,4 +1,4 @@
-"""Where people wait for somebody to play with: pairs them, and sees to those for whom nobody comes."""
+"""What the page of somebody who waits for a partner is told; galley.records.store.pairing pairs them."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ class Meeting:
 
 
 class Lobby:
-    """Pairs people who wait for the same round of the same study, at this serving process or another.
+    """Asks the records to pair who waits, and sees to those for whom nobody comes.
 
-    Who waits is in the records, where one process at a time pairs two of them. Two visits fit when the study,
-    the `pairing` of their steps and whether they are tests are the same. Who waited longest goes first and
-    gets the seat of their plan. Who waits too long meets the round's fallback.
+    Who waits is in the records, where one process at a time pairs two of them, whichever they came to. Two
+    visits fit when the study, the `pairing` of their steps and whether they are tests are the same. Who
+    waited longest goes first and gets the seat of their plan. Who waits too long meets the round's fallback.
     """
 
     def __init__(self, store: Store, matches: Matches, visits: Visits, clock: Clock) -> None:

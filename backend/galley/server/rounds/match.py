@@ -16,10 +16,10 @@ from galley.protocol.scene import Scene
 from galley.records import LeaseLost, PauseRow
 from galley.records.store.absences import MOST_ABSENCES
 from galley.server.clock import Clock, Deadlines, Timer
-from galley.server.rounds.episodes import Course
 from galley.server.rounds.match_host import MatchHost
 from galley.server.rounds.person import Connection, Person
-from galley.server.rounds.round_journal import Handed, Played, RoundJournal
+from galley.server.rounds.round_journal import Played, RoundJournal, SentAt
+from galley.server.rounds.round_kitchen import RoundKitchen
 from galley.server.rounds.round_messages import round_end, round_keyframe, round_tick
 from galley.server.rounds.round_spec import RoundSpec
 from galley.server.rounds.thinking import Mind, Question
@@ -44,7 +44,7 @@ class Match:
     def __init__(
         self,
         spec: RoundSpec,
-        course: Course,
+        round_kitchen: RoundKitchen,
         players: tuple[Person | Mind, Person | Mind],
         journal: RoundJournal,
         clock: Clock,
@@ -53,8 +53,8 @@ class Match:
         stagger: float,
     ) -> None:
         self.spec = spec
-        self.course = course
-        self.scene = Scene(course.layout)
+        self.round_kitchen = round_kitchen
+        self.scene = Scene(round_kitchen.layout)
         self.players = list(players)
         self.phase = "waiting"
         self.outcome: RoundOutcome | None = None
@@ -70,15 +70,15 @@ class Match:
         self._pause: PauseRow | None = None
         self._ending: asyncio.Task[None] | None = None
         self._replacing: asyncio.Task[None] | None = None
-        if course.between:
-            course.next_episode()
-        self.state = course.kitchen.state.copy()
+        if round_kitchen.between:
+            round_kitchen.next_episode()
+        self.state = round_kitchen.kitchen.state.copy()
         self._questions: dict[int, Question] = {}
-        if course.over:
+        if round_kitchen.over:
             self.end("finished")
             return
         self._ask(None)
-        if course.ticks > 0:
+        if round_kitchen.ticks > 0:
             self._stand_still(RESTART)
         else:
             self._await()
@@ -91,7 +91,7 @@ class Match:
     @property
     def under_way(self) -> bool:
         """Whether the round is played: it ticks, or counts down to go on after its first tick."""
-        return self.phase == "playing" or (self.phase == "countdown" and self.course.ticks > 0)
+        return self.phase == "playing" or (self.phase == "countdown" and self.round_kitchen.ticks > 0)
 
     # ---- what the browsers do ------------------------------------------------------------------------------
 
@@ -172,7 +172,7 @@ class Match:
             person.keys.press(message.key)
         else:
             person.keys.let_go(message.key)
-        self.journal.key(message, arrival_s, self.course.ticks, person.seat)
+        self.journal.key(message, arrival_s, self.round_kitchen.ticks, person.seat)
 
     def release(self, person: Person, message: messages.Release, arrival_s: float) -> None:
         """All keys were let go; outside of play there is none to let go of."""
@@ -184,7 +184,7 @@ class Match:
                 person.hidden_ms = self._clock.ms(arrival_s)
                 self._host.hidden(self, person, person.hidden_ms, None)
             person.keys.let_go_all()
-            self.journal.key(message, arrival_s, self.course.ticks, person.seat)
+            self.journal.key(message, arrival_s, self.round_kitchen.ticks, person.seat)
 
     def ping(self, person: Person, message: messages.Ping, arrival_s: float) -> None:
         """Answer a ping and note it."""
@@ -221,19 +221,19 @@ class Match:
             person.keys.forget_waiting()
         self.phase = "playing"
         # The first tick is due a whole tick from now at the earliest, so that keys can reach it.
-        self._deadlines.begin(self._loop.time(), self.course.ticks)
+        self._deadlines.begin(self._loop.time(), self.round_kitchen.ticks)
         if self._pause is not None:
             self.journal.goes_on(self._pause)
             self._pause = None
         self._show_all()
-        self._timer.set(self.deadline(self.course.ticks), self._tick)
+        self._timer.set(self.deadline(self.round_kitchen.ticks), self._tick)
 
     def _tick(self) -> None:
         if self.journal.lost:
             self.lose()
             return
-        course = self.course
-        tick = course.ticks
+        round_kitchen = self.round_kitchen
+        tick = round_kitchen.ticks
         deadline_s = self.deadline(tick)
         people = self.people
         actions = [STAY, STAY]
@@ -252,29 +252,31 @@ class Match:
                     actions[seat] = answer.action
         joint = (actions[0], actions[1])
         before = self.state
-        course.step(*joint)
-        self.state = course.kitchen.state.copy()
+        round_kitchen.step(*joint)
+        self.state = round_kitchen.kitchen.state.copy()
         text = encode(round_tick(self, before))
-        handed = Handed()
+        sent_at = SentAt()
         for person in people:
             if person.connection is not None:
-                person.connection.send(text, handed)
-        played = Played(tick, joint, deadline_s, self._loop.time(), handed, decision_ms, late, fault)
+                person.connection.send(text, sent_at)
+        played = Played(tick, joint, deadline_s, self._loop.time(), sent_at, decision_ms, late, fault)
         self.journal.played(played)
-        if not course.kitchen.done:
+        if not round_kitchen.kitchen.done:
             self._ask((before, joint))
             self._timer.set(self.deadline(tick + 1), self._tick)
-        elif course.over:
+        elif round_kitchen.over:
             self.end("finished")
         else:
             self._next_episode()
 
     def _next_episode(self) -> None:
-        self.course.next_episode()
-        self.state = self.course.kitchen.state.copy()
+        self.round_kitchen.next_episode()
+        self.state = self.round_kitchen.kitchen.state.copy()
         for seat, player in enumerate(self.players):
             if not isinstance(player, Person):
-                player.restart(self.course.layout, seat, self.spec.seeds[self.course.episode - 1])
+                player.restart(
+                    self.round_kitchen.layout, seat, self.spec.seeds[self.round_kitchen.episode - 1]
+                )
         self._ask(None)
         self.phase = "countdown"
         self._show_all()
@@ -282,7 +284,7 @@ class Match:
 
     def _ask(self, seen: Any) -> None:
         self._questions = {
-            seat: player.ask(self.course.kitchen.tick, self.state, seen)
+            seat: player.ask(self.round_kitchen.kitchen.tick, self.state, seen)
             for seat, player in enumerate(self.players)
             if not isinstance(player, Person)
         }
@@ -298,7 +300,7 @@ class Match:
             if reason == RESTART:
                 person.ready = False
         if self._pause is None:
-            self._pause = self.journal.pause(self.course.ticks, reason)
+            self._pause = self.journal.pause(self.round_kitchen.ticks, reason)
         self._wait_for(self.spec.abandon_after_s)
         self._show_all()
 

@@ -22,10 +22,10 @@ from galley.records.reading.round_replay import state_bytes
 from galley.records.store import queries
 from galley.server.clock import Clock, Stagger
 from galley.server.participant.visits import Visit, Visits
-from galley.server.rounds.episodes import Course
 from galley.server.rounds.match import Match
 from galley.server.rounds.person import Person
 from galley.server.rounds.round_journal import RoundJournal
+from galley.server.rounds.round_kitchen import RoundKitchen
 from galley.server.rounds.round_spec import RoundSpec
 from galley.server.rounds.set_up import of_one, of_two
 from galley.server.rounds.takeover import caught_up, ready_agent
@@ -308,19 +308,21 @@ class Matches:
             show_score=step.show_score,
             stand_in=None if step.lobby is None else step.lobby.dropout_agent,
         )
-        course = await self._think(lambda: caught_up(layout, row.episodes, row.joint_actions))
+        round_kitchen = await self._think(lambda: caught_up(layout, row.episodes, row.joint_actions))
         players: list[Person | Mind] = []
         stood_in = {one.seat: one for one in row.stand_ins}
         for seat in row.seats:
             who = stood_in.get(seat.seat, seat)
             if who.agent is not None:
-                players.append(await self._mind(who.agent, who.agent_sha256, course, seat.seat, spec, row))
+                players.append(
+                    await self._mind(who.agent, who.agent_sha256, round_kitchen, seat.seat, spec, row)
+                )
             else:
                 repeats = spec.input_mode == "hold"
                 players.append(Person(seat.seat, seat.visit_id or 0, ("", ""), visit.url, repeats=repeats))
         return Match(
             spec,
-            course,
+            round_kitchen,
             (players[0], players[1]),
             RoundJournal(self._store, self._clock, row.id, lease),
             self._clock,
@@ -329,14 +331,22 @@ class Matches:
         )
 
     async def _mind(
-        self, name: str, sha256: str | None, course: Course, seat: int, spec: RoundSpec, row: RoundRow
+        self,
+        name: str,
+        sha256: str | None,
+        round_kitchen: RoundKitchen,
+        seat: int,
+        spec: RoundSpec,
+        row: RoundRow,
     ) -> Mind:
         bundle = self._catalogue.bundle(name)
         if bundle.sha256 != sha256:
             LOG.warning("round %d goes on with another version of agent %s", row.id, name)
         # What the kitchen has come to is read now: a slow agent looks at it while the round goes on.
-        seen = row.joint_actions[len(row.joint_actions) - course.kitchen.tick :]
-        ready = partial(ready_agent, bundle, course.layout, seat, spec.seeds[course.episode - 1], seen)
+        seen = row.joint_actions[len(row.joint_actions) - round_kitchen.kitchen.tick :]
+        ready = partial(
+            ready_agent, bundle, round_kitchen.layout, seat, spec.seeds[round_kitchen.episode - 1], seen
+        )
         if bundle.think_ms is not None:
             return SlowMind(ready, name, bundle.think_ms, repeats=bundle.repeats)
         return Mind(self._thinking, await self._think(ready), name, repeats=bundle.repeats)
@@ -348,17 +358,17 @@ class Matches:
 
     async def finish(self, match: Match, outcome: RoundOutcome) -> None:
         """Store the end of a round and move its people on."""
-        course = match.course
+        round_kitchen = match.round_kitchen
         live = self._live.get(match.spec.round_id)
         try:
             await asyncio.wrap_future(
                 self._store.finish_round(
                     match.spec.round_id,
                     outcome,
-                    course.score,
-                    course.deliveries,
+                    round_kitchen.score,
+                    round_kitchen.deliveries,
                     self._clock.ms(),
-                    state_bytes(course.last_state),
+                    state_bytes(round_kitchen.last_state),
                     lease=match.journal.lease,
                 )
             )
@@ -378,7 +388,7 @@ class Matches:
             self._store.stand_in(
                 match.spec.round_id,
                 person.seat,
-                match.course.ticks,
+                match.round_kitchen.ticks,
                 bundle.name,
                 bundle.sha256,
                 now_ms,
@@ -393,7 +403,9 @@ class Matches:
         else:
             row = await self._row(next(iter(live.visits.values())))
         live.row = row or live.row
-        return await self._mind(bundle.name, bundle.sha256, match.course, person.seat, match.spec, live.row)
+        return await self._mind(
+            bundle.name, bundle.sha256, match.round_kitchen, person.seat, match.spec, live.row
+        )
 
     def forget(self, match: Match) -> None:
         """Let go of a match; the next connection makes it anew from the journal."""

@@ -7,7 +7,7 @@ from typing import Protocol
 from galley.protocol.codec import encode
 from galley.protocol.messages import Outgoing
 from galley.server.rounds.key_state import KeyState
-from galley.server.rounds.round_journal import Handed
+from galley.server.rounds.round_journal import SentAt
 
 
 class Connection(Protocol):
@@ -15,7 +15,7 @@ class Connection(Protocol):
 
     tab: str
 
-    def send(self, text: str, handed: Handed | None = None) -> None:
+    def send(self, text: str, sent_at: SentAt | None = None) -> None:
         """Queue a frame."""
 
     def close(self, code: int) -> None:

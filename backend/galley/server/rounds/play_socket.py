@@ -16,6 +16,7 @@ from galley.protocol.messages import (
     CLOSE_ENDED,
     CLOSE_REFUSED,
     CLOSE_REPLACED,
+    CLOSE_RESTART,
     PROTOCOL,
     Hello,
     Incoming,
@@ -30,7 +31,7 @@ from galley.server.participant.visits import Visits
 from galley.server.rounds.match import LEFT, RESTART
 from galley.server.rounds.matches import Matches, Place, RoundBusy
 from galley.server.rounds.relay import RELAYED, pass_on
-from galley.server.rounds.round_journal import Handed
+from galley.server.rounds.round_journal import SentAt
 
 LOG = logging.getLogger(__name__)
 MAX_BEHIND = 200
@@ -39,7 +40,6 @@ SOCKETS_PER_S = 1.0
 SOCKETS_AT_ONCE = 20
 HELLO_WITHIN_S = 20.0
 CLOSE_WITHIN_S = 5.0
-SERVICE_RESTART = 1012  # RFC 6455 registry: the server is going down; browsers cannot send it
 
 
 class Socket:
@@ -55,13 +55,13 @@ class Socket:
         self.place: Place | None = None
         self._websocket = websocket
         self._loop = asyncio.get_running_loop()
-        self._queue: deque[tuple[str, Handed | None]] = deque()
+        self._queue: deque[tuple[str, SentAt | None]] = deque()
         self._wake = asyncio.Event()
         self._close_code: int | None = None
         self._behind = False
 
-    def send(self, text: str, handed: Handed | None = None) -> None:
-        """Queue a frame; `handed` learns when it was given to the socket.
+    def send(self, text: str, sent_at: SentAt | None = None) -> None:
+        """Queue a frame; `sent_at` learns when it was given to the socket.
 
         Raises:
             MessageError: it is checked, and not as the protocol's table says.
@@ -72,7 +72,7 @@ class Socket:
             self._queue.clear()
             self._behind = True
         if not self._behind:
-            self._queue.append((text, handed))
+            self._queue.append((text, sent_at))
             self._wake.set()
 
     def close(self, code: int) -> None:
@@ -91,10 +91,10 @@ class Socket:
         try:
             while True:
                 while self._queue:
-                    text, handed = self._queue.popleft()
+                    text, sent_at = self._queue.popleft()
                     await self._websocket.send_text(text)
-                    if handed is not None:
-                        handed.at_s = self._loop.time()
+                    if sent_at is not None:
+                        sent_at.at_s = self._loop.time()
                 if self._behind:
                     self._behind = False
                     if self.place is not None and self.place.person.connection is self:
@@ -232,7 +232,7 @@ class Conversation:
             return None
         if event["type"] == "websocket.disconnect":
             self.stage = Stage.OVER
-            self.reason = RESTART if event.get("code") == SERVICE_RESTART else LEFT
+            self.reason = RESTART if event.get("code") == CLOSE_RESTART else LEFT
             return None
         text: str | None = event.get("text")
         return event.get("bytes") or b"" if text is None else text

@@ -13,7 +13,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import WebSocketException
 
 from galley.errors import GalleyError
-from galley.protocol.messages import CLOSE_BUSY
+from galley.protocol.messages import CLOSE_BUSY, CLOSE_NORMAL, CLOSE_RESTART
 
 LOG = logging.getLogger(__name__)
 RELAYED: Final = "x-galley-relayed"
@@ -71,7 +71,7 @@ async def _up(websocket: WebSocket, there: ClientConnection, pace: Callable[[], 
         while True:
             event = await websocket.receive()
             if event["type"] == "websocket.disconnect":
-                await there.close(1012 if event.get("code") == 1012 else 1000)
+                await there.close(CLOSE_RESTART if event.get("code") == CLOSE_RESTART else CLOSE_NORMAL)
                 return
             text = event.get("text")
             await there.send(event.get("bytes") or b"" if text is None else text)

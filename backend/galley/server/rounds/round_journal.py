@@ -29,7 +29,7 @@ class JournalStore(Protocol):
         """Take rows."""
 
 
-class Handed:
+class SentAt:
     """When a message was handed to the socket, monotonic seconds; None until then."""
 
     __slots__ = ("at_s",)
@@ -49,7 +49,7 @@ class Played:
     joint: tuple[int, int]
     deadline_s: float
     computed_s: float
-    handed: Handed
+    sent_at: SentAt
     decision_ms: float | None
     late: bool
     fault: str | None
@@ -82,12 +82,12 @@ class RoundJournal:
         if last is None:
             return
         self._last = None
-        handed_s = last.computed_s if last.handed.at_s is None else last.handed.at_s
+        sent_s = last.computed_s if last.sent_at.at_s is None else last.sent_at.at_s
         row = TickRow(
             last.tick,
             *last.joint,
             deadline_ms=self._clock.ms(last.deadline_s),
-            lateness_ms=(handed_s - last.deadline_s) * 1000.0,
+            lateness_ms=(sent_s - last.deadline_s) * 1000.0,
             decision_ms=last.decision_ms,
             late=last.late,
             fault=last.fault,

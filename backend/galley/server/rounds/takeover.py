@@ -12,18 +12,18 @@ from galley.agents.episode import take_up
 from galley.agents.protocol import Agent
 from galley.kitchen import Layout
 from galley.kitchen.trajectory import Trajectory, episodes_of
-from galley.server.rounds.episodes import Course
+from galley.server.rounds.round_kitchen import RoundKitchen
 from galley.server.rounds.thinking import Unable
 
 LOG = logging.getLogger(__name__)
 
 
-def caught_up(layout: Layout, episodes: int, joint_actions: NDArray[np.uint8]) -> Course:
+def caught_up(layout: Layout, episodes: int, joint_actions: NDArray[np.uint8]) -> RoundKitchen:
     """The kitchen after the joint actions (uint8 [T, 2]) of all episodes so far."""
-    course = Course(layout, episodes)
+    round_kitchen = RoundKitchen(layout, episodes)
     for episode in episodes_of(Trajectory(layout, joint_actions), episodes):
-        course.take_up(episode.joint_actions)
-    return course
+        round_kitchen.take_up(episode.joint_actions)
+    return round_kitchen
 
 
 def ready_agent(bundle: Bundle, layout: Layout, seat: int, seed: int, seen: NDArray[np.uint8]) -> Agent:

@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 from galley.kitchen import Kitchen, Layout
 
 
-class Course:
-    """One kitchen, begun anew for each episode. `ticks` counts through them all, `kitchen.tick` within one.
+class RoundKitchen:
+    """The kitchen of a round, begun anew for each episode.
 
+    `ticks` counts through all episodes, `kitchen.tick` within one.
     An episode that is over stays until `next_episode`.
     """
 
