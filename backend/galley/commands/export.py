@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -42,6 +43,7 @@ def export(
     from galley.records.store.store import Store
     from galley.workspace import Workspace
 
+    os.umask(0o077)  # people's data: for this account alone
     with Store.open(database or Workspace(workspace).database, must_exist=True) as store:
         written = {
             out / file: f"{rows} rows"

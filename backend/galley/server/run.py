@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import socket
@@ -19,6 +20,7 @@ from galley.errors import GalleyError
 from galley.records import Store
 from galley.server.app import create_app
 from galley.server.content import load_content
+from galley.server.logs import log_to
 from galley.server.request_bounds import BoundedHttp
 from galley.server.settings import Settings, read_settings
 from galley.server.socket_bounds import BoundedWebSocket
@@ -82,6 +84,7 @@ def preview(
 
 def _serve(workspace: Workspace, settings: Settings, database: str, *, preview: bool) -> None:
     listening = listen(settings)
+    log = log_to(sys.stderr, settings.log_level)
     try:
         with Store.open(database, serving=True) as store:
             known = replace(
@@ -101,6 +104,8 @@ def _serve(workspace: Workspace, settings: Settings, database: str, *, preview: 
                 return
     finally:
         listening.close()
+        logging.getLogger().removeHandler(log)
+        log.close()
 
 
 def server_config(app: FastAPI, settings: Settings) -> uvicorn.Config:
@@ -116,6 +121,7 @@ def server_config(app: FastAPI, settings: Settings) -> uvicorn.Config:
         ws_ping_interval=PING_EVERY_S,
         ws_ping_timeout=PING_WITHIN_S,
         access_log=False,
+        log_config=None,
         log_level=settings.log_level,
         server_header=False,
         timeout_graceful_shutdown=SHUTDOWN_WITHIN_S,

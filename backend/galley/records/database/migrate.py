@@ -43,7 +43,10 @@ def migrate(url: URL, *, locked: bool, scripts: Path = SCRIPTS) -> None:
         with serving_lock(file) if file is not None and not locked else nullcontext():
             _upgrade(engine, shown(url), directory, config)
     except DatabaseError as error:
-        raise GalleyError(f"{shown(url)}: cannot be opened as records: {one_line(error)}") from None
+        fix = "name another with --database"
+        if "readonly" in one_line(error):
+            fix = f"let this account write it and its folder, or {fix}"
+        raise GalleyError(f"{shown(url)}: cannot be opened as records: {one_line(error)}; {fix}") from None
     finally:
         engine.dispose()
 

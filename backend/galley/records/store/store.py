@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Self
+
+from sqlalchemy import Engine, false, update
+from sqlalchemy.exc import DBAPIError
 
 from galley.errors import GalleyError
 from galley.records.database.engine import connect, database_url, shown, sqlite_file
 from galley.records.database.migrate import migrate
-from galley.records.database.retries import RETRY_FOR_S
+from galley.records.database.retries import RETRY_FOR_S, one_line
 from galley.records.database.serving_lock import serving_lock
+from galley.records.database.tables import STUDIES
 from galley.records.database.writer import FLUSH_EVERY_S
 from galley.records.store.round_store import RoundStore
 from galley.records.store.visit_store import VisitStore
@@ -39,7 +44,7 @@ class Store(VisitStore, RoundStore):
 
         Raises:
             GalleyError: it cannot be opened, is newer than this Galley, does not exist though it must, or is
-                to be served and is served already.
+                to be served and is served already or cannot be written.
         """
         url = database_url(database)
         file = sqlite_file(url)
@@ -50,7 +55,9 @@ class Store(VisitStore, RoundStore):
         lock = None
         try:
             if file is not None:
-                file.parent.mkdir(parents=True, exist_ok=True)
+                # Participants' data: for this account alone, unless somebody opened it to others.
+                file.parent.mkdir(0o700, parents=True, exist_ok=True)
+                os.close(os.open(file, os.O_CREAT | (os.O_RDWR if serving else os.O_RDONLY), 0o600))
                 lock = serving_lock(file) if serving else None
             migrate(url, locked=lock is not None)
         except BaseException as error:
@@ -60,11 +67,33 @@ class Store(VisitStore, RoundStore):
                 fix = "name another database with --database"
                 raise GalleyError(f"{file}: {error.strerror or error}; {fix}") from None
             raise
-        reader = connect(url, writes=False)
-        return cls(shown(url), connect(url, writes=True), reader, lock, flush_every_s, retry_for_s)
+        engine = connect(url, writes=True)
+        if serving:
+            try:
+                _check_writable(engine, shown(url))
+            except GalleyError:
+                engine.dispose()
+                if lock is not None:
+                    lock.release()
+                raise
+        return cls(shown(url), engine, connect(url, writes=False), lock, flush_every_s, retry_for_s)
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _check_writable(engine: Engine, name: str) -> None:
+    """Try a write that changes nothing.
+
+    Raises:
+        GalleyError: the database lets nobody write, or not this user.
+    """
+    try:
+        with engine.begin() as connection:
+            connection.execute(update(STUDIES).where(false()).values(state=STUDIES.c.state))
+    except DBAPIError as error:
+        fix = "let this account write it and its folder, or name another database with --database"
+        raise GalleyError(f"{name}: the database cannot be written ({one_line(error)}); {fix}") from None
