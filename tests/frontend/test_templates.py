@@ -262,3 +262,11 @@ def test_the_code_can_be_found_and_the_way_on_is_a_link() -> None:
     assert page.all("output", id="completion-code")
     assert page.all("a", href=contexts()["debrief.html"]["redirect"])
     assert not Page(render("debrief.html", completion_code=None, redirect=None)).all("output")
+
+
+def test_d1_the_landing_page_tells_the_least_and_the_most_minutes() -> None:
+    assert "<strong>12\u201326 minutes</strong>" in render(
+        "landing.html", minutes=26, minutes_told="12\u201326"
+    )
+    assert "<strong>1 minute</strong>" in render("landing.html", minutes=1, minutes_told="1")
+    assert "<strong>12 minutes</strong>" in render("landing.html")

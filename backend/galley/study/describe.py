@@ -25,7 +25,10 @@ def describe(study: Study) -> str:
 
 
 def _head(study: Study) -> Iterator[str]:
-    yield f"{study.name}: {study.title}, about {study.minutes} minutes"
+    (least, most), rounds = (study.quoted.numbers[name] for name in ("minutes", "rounds"))
+    minutes = f"{most}" if least == most else f"{least} to {most}"
+    varied = "" if rounds[0] == rounds[1] else f", {rounds[0]} to {rounds[1]} rounds"
+    yield f"{study.name}: {study.title}, about {minutes} minutes{varied}"
     if len(study.languages) > 1:
         yield f"     in {', '.join(study.languages)}"
     for name, factor in study.config.factors.items():

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 from galley.errors import InvalidFiles, Problem
 from galley.files.reading import Document, Loaded, read
 from galley.kitchen import Layout
 from galley.outcomes import TurnedAway, VisitOutcome
-from galley.study.estimate import estimated_minutes, text_values
+from galley.study.estimate import Ranges, in_figures, ranges
 from galley.study.visit.steps import QuestionsStep
 from galley.study.written.crosscheck import agent_problems, kitchen_problems, questionnaire_problems
 from galley.study.written.named_files import content_sha256, known_layouts_of, text_file
@@ -19,9 +20,17 @@ from galley.study.written.study_file import StudyFile, names_of
 from galley.study.written.texts import PageText, load_text
 from galley.workspace import Kind, Workspace
 
-__all__ = ["Study", "estimated_minutes", "known_layouts_of", "load_study"]
+__all__ = ["Study", "known_layouts_of", "load_study"]
 
 CHECKED_KINDS: tuple[Kind, ...] = ("agents", "questionnaires", "texts", "invitations")
+
+
+@dataclass(frozen=True)
+class Quoted:
+    """Texts, and the numbers in them: the least and the most that the visits meet who read them."""
+
+    texts: Mapping[str, PageText]
+    numbers: Ranges
 
 
 @dataclass(frozen=True)
@@ -35,13 +44,15 @@ class Study:
     name: str
     config: StudyFile
     questionnaires: Mapping[str, Questionnaire]
-    texts: Mapping[str, PageText]
+    quoted: Quoted
     layouts: Mapping[str, Layout]
     sha256: str
     language: str = "en"
     invitations: frozenset[str] | None = None
     translations: Mapping[str, Study] = field(default_factory=dict, repr=False, compare=False)
     """The study in each of its languages, by code."""
+    by_condition: Mapping[tuple[str, ...], Quoted] = field(default_factory=dict, repr=False, compare=False)
+    """What visits of each condition are told, by the levels of the factors in their order."""
 
     @property
     def title(self) -> str:
@@ -55,8 +66,18 @@ class Study:
 
     @property
     def minutes(self) -> int:
-        """How long a visit takes: as written, else estimated."""
-        return estimated_minutes(self.config, self.questionnaires)
+        """How long a visit takes at most: as written, else estimated."""
+        return self.quoted.numbers["minutes"][1]
+
+    @property
+    def minutes_told(self) -> str:
+        """How long a visit takes, in figures: the least and the most where visits differ."""
+        return in_figures(*self.quoted.numbers["minutes"])
+
+    @property
+    def texts(self) -> Mapping[str, PageText]:
+        """Every text, with the numbers that visits meet."""
+        return self.quoted.texts
 
     @property
     def agents(self) -> tuple[str, ...]:
@@ -71,6 +92,11 @@ class Study:
     def in_language(self, code: str) -> Study:
         """The same study with every word in one of its languages; the study itself for any other code."""
         return self.translations.get(code, self)
+
+    def met_by(self, condition: Mapping[str, Any]) -> Study:
+        """The same study with the numbers of one condition in its texts; itself where that is unknown."""
+        levels = tuple(str(condition.get(name, "")) for name in self.config.factors)
+        return replace(self, quoted=self.by_condition.get(levels, self.quoted))
 
     def questionnaire_for(self, step: QuestionsStep) -> Questionnaire:
         """The questionnaire of a step, its items in the order that the visit's plan gives them."""
@@ -121,7 +147,10 @@ def load_study(workspace: Workspace, name: str) -> Study:
         reader = _Reader(workspace, code, loaded.value.languages, layouts, problems)
         found = reader.parts(document, context)
         if found is not None:
-            studies[code] = Study(name, *found, used, sha256, code, invitations, studies)
+            config, asked, quoted, by_condition = found
+            studies[code] = Study(
+                name, config, asked, quoted, used, sha256, code, invitations, studies, by_condition
+            )
     if problems:
         raise InvalidFiles(problems)
     return next(iter(studies.values()))
@@ -139,8 +168,8 @@ class _Reader:
 
     def parts(
         self, document: Document, context: Mapping[str, tuple[str, ...]]
-    ) -> tuple[StudyFile, dict[str, Questionnaire], dict[str, PageText]] | None:
-        """The study file, questionnaires and texts; None when the file is wrong in this language."""
+    ) -> tuple[StudyFile, dict[str, Questionnaire], Quoted, dict[tuple[str, ...], Quoted]] | None:
+        """The study file, questionnaires and texts, for all and by condition; None when the file is wrong."""
         spoken = {"language": self.language, "languages": self.languages}
         try:
             loaded = document.validated(StudyFile, {**context, **spoken})
@@ -156,22 +185,25 @@ class _Reader:
             except InvalidFiles as invalid:
                 self.problems.extend(invalid.problems)
         self.problems.extend(questionnaire_problems(loaded, read))
-        values = text_values(config, read)
-        grids = {name: layout.grid for name, layout in self.layouts.items()} or None
-        texts = {}
-        for name in names_of(config, "texts"):
-            text = self._text(loaded, name, grids, values)
-            if text is not None:
-                texts[name] = text
-        return config, read, texts
+        everybody = self._quoted(loaded, ranges(config, read, config.conditions()))
+        made = {tuple(everybody.numbers.values()): everybody}
+        by_condition = {}
+        for condition in config.conditions():
+            numbers = ranges(config, read, [condition])
+            key = tuple(numbers.values())
+            if key not in made:
+                made[key] = self._quoted(loaded, numbers)
+            by_condition[tuple(condition.values())] = made[key]
+        return config, read, everybody, by_condition
 
-    def _text(
-        self,
-        loaded: Loaded[StudyFile],
-        name: str,
-        grids: Mapping[str, tuple[str, ...]] | None,
-        values: Mapping[str, object],
-    ) -> PageText | None:
+    def _quoted(self, loaded: Loaded[StudyFile], numbers: Ranges) -> Quoted:
+        """Every text that can be read, with these numbers in it."""
+        texts = {name: self._text(loaded, name, numbers) for name in names_of(loaded.value, "texts")}
+        return Quoted({name: text for name, text in texts.items() if text is not None}, numbers)
+
+    def _text(self, loaded: Loaded[StudyFile], name: str, numbers: Ranges) -> PageText | None:
+        grids = {name: layout.grid for name, layout in self.layouts.items()} or None
+        values = {name: in_figures(*both) for name, both in numbers.items()}
         own = self.language == loaded.value.languages[0]
         file = text_file(self.workspace, name, self.language, own=own)
         if file is None:

@@ -144,6 +144,7 @@ class Pages:
             "landing.html",
             study=public_study(spoken),
             minutes=spoken.minutes,
+            minutes_told=spoken.minutes_told,
             action=f"/s/{study}/begin" + (f"?{urlencode(others)}" if others else ""),
             language=spoken.language,
             languages=offered,

@@ -20,7 +20,8 @@ from galley.study.written.recruitment import Ending
 
 def public_study(study: Study) -> dict[str, Any]:
     """What templates may know of a study: no agents, no design."""
-    return {"name": study.name, "title": study.title, "about": study.about, "minutes": study.minutes}
+    minutes = {"minutes": study.minutes, "minutes_told": study.minutes_told}
+    return {"name": study.name, "title": study.title, "about": study.about, **minutes}
 
 
 def public_step(step: Step) -> dict[str, Any]:

@@ -256,7 +256,7 @@ class Visits:
         attempt = found.attempt if found.attempt is not None and found.attempt.step_id == here else None
         return Visit(
             row,
-            study.in_language(row.language),
+            study.in_language(row.language).met_by(plan.condition),
             plan,
             Progress(row.step_index, row.status, row.tries),
             found.answers,

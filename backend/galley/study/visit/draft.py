@@ -38,12 +38,12 @@ class Draft:
     """
 
     def __init__(self, study: Study, seed: int, slot: int, say: Say) -> None:
-        self.study = study
+        self.condition = cell_of_slot(study, slot)
+        self.study = study.met_by(self.condition)
         self.config = study.config
         self.seed = seed
         self.slot = slot
         self.say = say
-        self.condition = cell_of_slot(study, slot)
         self.place = 0
         self.of = sum(s.rounds for s in self.config.stages if s.meets(self.condition))
         self.round_no = 0
