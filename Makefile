@@ -11,6 +11,9 @@ GALLEY := $(VENV)/bin/galley
 PIP := $(PY) -m pip --disable-pip-version-check --quiet
 BASE := $(VENV)/.base-installed
 ALL := $(VENV)/.all-installed
+KERNELS := $(VENV)/.kernels-compiled
+SOURCES := $(shell find backend/galley/compiled backend/galley/kitchen backend/galley/planning backend/galley/agents -name '*.py')
+JOBS ?= 2
 NODE := node_modules/.installed
 
 help: ## list the targets
@@ -19,12 +22,12 @@ help: ## list the targets
 serve: $(BASE) ## set up without PyTorch, then serve the demo study (PORT=8000 DATABASE=sqlite:///file; STUDY= for all)
 	@$(GALLEY) serve . $(if $(STUDY),--study $(STUDY)) --port $(PORT) $(if $(DATABASE),--database '$(DATABASE)')
 
-test: $(ALL) ## set up everything, then run the tests
+test: $(ALL) $(KERNELS) ## set up everything, then run the tests (JOBS=2 at a time)
 	@sh tests/chromium.sh > /dev/null
 	@sh tests/postgres.sh
 	@sh tests/nginx.sh
 	@$(PY) tests/overcooked_package.py > /dev/null
-	@CHROMIUM="$$(sh tests/chromium.sh)" $(PY) -m pytest
+	@CHROMIUM="$$(sh tests/chromium.sh)" $(PY) -m pytest --numprocesses=$(JOBS) --dist=loadfile
 
 lint: $(ALL) $(NODE) ## ruff, mypy, import-linter, tsc on the frontend
 	$(VENV)/bin/ruff check .
@@ -65,6 +68,11 @@ $(ALL): pyproject.toml | $(PY)
 	@echo "Installing Galley with all extras (PyTorch is large: some minutes the first time) ..."
 	@$(PIP) install --editable '.[learn,design,dev]'
 	@touch $@ $(BASE)
+
+$(KERNELS): $(ALL) $(SOURCES)
+	@echo "Compiling kernels (a minute or two the first time) ..."
+	@$(PY) -m galley.agents.warm_up
+	@touch $@
 
 $(NODE): package.json
 	@command -v npm > /dev/null || { echo "make lint checks the browser code with TypeScript and needs npm; install it with: apt-get install nodejs npm" >&2; exit 1; }
