@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from galley.commands.options import DatabaseOption, JsonOption, WorkspaceOption
+
+if TYPE_CHECKING:
+    from galley.datasets.lsi_study import StudyGame
 
 app = typer.Typer(help="Recorded games: import, verify, measure, draw.", no_args_is_help=True)
 
@@ -18,35 +22,50 @@ app = typer.Typer(help="Recorded games: import, verify, measure, draw.", no_args
 def import_files(
     files: Annotated[
         list[Path],
-        typer.Argument(metavar="FILE...", help="Pickles of human games, or .csv of the LSI user study."),
+        typer.Argument(
+            metavar="FILE...",
+            help="Pickles of human games; .csv of the LSI study or of `galley export --human-data`.",
+        ),
     ],
     json_: JsonOption = False,
 ) -> None:
-    """Replay recorded human games and compare: every transition of pickles, the figures of .csv files."""
-    studies = [file for file in files if file.suffix.lower() == ".csv"]
-    pickles = [file for file in files if file not in studies]
-    if studies:
-        _import_study(studies, json_)
-    if not pickles:
-        return
+    """Replay recorded games and compare: every transition, or the figures of the LSI study."""
+    from galley.datasets.kinds_of_files import CSV_READERS, csv_kind
+    from galley.datasets.lsi_study import read_games
+    from galley.datasets.overcooked_games import ImportReport
     from galley.datasets.overcooked_games import import_files as read
+    from galley.errors import GalleyError
 
-    report = read(pickles)
-    figures = {
-        "games": report.games,
-        "transitions": report.transitions,
-        "matched": report.matched,
-        "mismatched": report.mismatched,
-    }
-    typer.echo(json.dumps(figures) if json_ else " ".join(f"{key}={value}" for key, value in figures.items()))
-    if report.mismatched:
+    wrong: list[str] = []
+    report = ImportReport(0, 0, 0, 0)
+    games: list[StudyGame] = []
+    for file in files:
+        try:
+            kind = csv_kind(file) if file.suffix.lower() == ".csv" else "pickle"
+            if kind == "study":
+                games += read_games(file)
+            else:
+                report += read([file], CSV_READERS.get(kind))
+        except GalleyError as error:
+            wrong.append(str(error))
+    as_recorded = not games or _told_study(games, json_)
+    if report.games:
+        figures = {
+            "games": report.games,
+            "transitions": report.transitions,
+            "matched": report.matched,
+            "mismatched": report.mismatched,
+        }
+        words = " ".join(f"{key}={value}" for key, value in figures.items())
+        typer.echo(json.dumps(figures) if json_ else words)
+    if wrong:
+        raise GalleyError("\n".join(wrong))
+    if report.mismatched or not as_recorded:
         raise typer.Exit(1)
 
 
-def _import_study(files: list[Path], json_: bool) -> None:
-    from galley.datasets.lsi_study import import_study
-
-    games = import_study(files)
+def _told_study(games: Sequence[StudyGame], json_: bool) -> bool:
+    """Print how each game of the LSI study compares; whether all are as recorded."""
     different = 0
     for game in games:
         told = game.differences()
@@ -58,8 +77,7 @@ def _import_study(files: list[Path], json_: bool) -> None:
             typer.echo(f"{game.place} {game.name}: {'; '.join(told) or 'as recorded'}")
     figures = {"games": len(games), "equal": len(games) - different, "different": different}
     typer.echo(json.dumps(figures) if json_ else " ".join(f"{key}={value}" for key, value in figures.items()))
-    if different:
-        raise typer.Exit(1)
+    return not different
 
 
 @app.command()

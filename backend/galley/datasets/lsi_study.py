@@ -110,11 +110,6 @@ def read_games(path: Path) -> list[StudyGame]:
     return games
 
 
-def import_study(paths: Iterable[Path]) -> list[StudyGame]:
-    """All games of several participants' files."""
-    return [game for path in paths for game in read_games(path)]
-
-
 def _game(row: dict[str, str], place: str) -> StudyGame:
     name = row["lvl_type"]
     try:

@@ -8,7 +8,7 @@ the timer of a pot run on past `cook_time`, and its order list is always `['onio
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -75,30 +75,38 @@ class ImportReport:
     first_mismatch: str = ""
     """Where the first transition that does not agree stands; empty if all agree."""
 
+    def __add__(self, other: ImportReport) -> ImportReport:
+        return ImportReport(
+            self.games + other.games,
+            self.transitions + other.transitions,
+            self.matched + other.matched,
+            self.replayed + other.replayed,
+            self.first_mismatch or other.first_mismatch,
+        )
+
     @property
     def mismatched(self) -> int:
         """Transitions that do not agree."""
         return self.transitions - self.matched
 
 
-def import_files(paths: Iterable[Path]) -> ImportReport:
-    """The report on all games in pickled frames of human games.
+def import_files(
+    paths: Iterable[Path], reader: Callable[[Path], list[HumanGame]] | None = None
+) -> ImportReport:
+    """The report on all games in files: pickled frames of human games, or what `reader` reads.
 
     Raises:
         GalleyError: a file cannot be read, is refused, or holds something else than such games.
     """
-    games = transitions = matched = replayed = 0
-    first = ""
+    report = ImportReport(0, 0, 0, 0)
     for path in paths:
-        for number, game in enumerate(human_games(path)):
+        for number, game in enumerate((reader or human_games)(path)):
             agrees = matches(game)
-            games += 1
-            transitions += len(agrees)
-            matched += int(agrees.sum())
-            replayed += follows(game)
-            if not first and not agrees.all():
-                first = f"{path}: game {number}, {game.layout.name}, tick {int(agrees.argmin())}"
-    return ImportReport(games, transitions, matched, replayed, first)
+            place = f"{path}: game {number}, {game.layout.name}, tick {int(agrees.argmin())}"
+            report += ImportReport(
+                1, len(agrees), int(agrees.sum()), int(follows(game)), "" if agrees.all() else place
+            )
+    return report
 
 
 def matches(game: HumanGame) -> NDArray[np.bool_]:

@@ -10,16 +10,11 @@ import json
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
-from galley.kitchen import Layout
-from galley.kitchen.codes import INGREDIENTS_PER_SOUP, ONION_SOUP, THINGS, TOMATO_SOUP
-from galley.kitchen.pots import amount_in, onions_in, recipe_of_thing
-from galley.kitchen.state import ChefView, KitchenView, PotView, view
+from galley.datasets.field_states import ACTIONS_THERE, state_there
+from galley.kitchen.state import view
 from galley.records.export.columns import Field, Sheet
 from galley.records.reading.round_replay import Replayed
 from galley.records.rows import RoundRow
-
-ACTIONS_THERE: Final = ([0, -1], [0, 1], [1, 0], [-1, 0], [0, 0], "interact")
-"""Our action codes as the field writes them; the first four are facings too."""
 
 HUMAN_DATA: Final = Sheet(
     "human-data",
@@ -81,59 +76,3 @@ def _players(row: RoundRow, people: Mapping[int, str], tick: int) -> dict[str, A
         found[f"player_{seat.seat}_id"] = people.get(seat.seat) if agent is None else agent
         found[f"player_{seat.seat}_is_human"] = agent is None
     return found
-
-
-def state_there(layout: Layout, seen: KitchenView) -> dict[str, Any]:
-    """A kitchen as the field's package writes it."""
-    cook_time = layout.rules.cook_time_ticks
-    things = [_thing(code, place, cook_time) for place, code in seen.things.items()]
-    soups = [_pot(pot, place, cook_time) for place, pot in seen.pots.items() if pot.count]
-    return {
-        "players": [_chef(chef, cook_time) for chef in seen.chefs],
-        "objects": [*things, *soups],
-        "bonus_orders": [],
-        "all_orders": [
-            {"ingredients": [kind] * INGREDIENTS_PER_SOUP} for kind in _orders(layout, seen.orders_delivered)
-        ],
-        "timestep": seen.tick,
-    }
-
-
-def _orders(layout: Layout, delivered: int) -> list[str]:
-    if layout.rules.orders is not None:
-        return sorted(set(layout.rules.orders[delivered:]))
-    return ["onion", *(["tomato"] if layout.tomatoes else [])]
-
-
-def _chef(chef: ChefView, cook_time: int) -> dict[str, Any]:
-    held = _thing(chef.held, (chef.x, chef.y), cook_time) if chef.held else None
-    return {"position": [chef.x, chef.y], "orientation": ACTIONS_THERE[chef.facing], "held_object": held}
-
-
-def _thing(code: int, place: tuple[int, int], cook_time: int) -> dict[str, Any]:
-    if code in (ONION_SOUP, TOMATO_SOUP):
-        recipe = recipe_of_thing(code)
-        onions = onions_in(recipe)
-        return _soup(onions, amount_in(recipe) - onions, cook_time, place, cook_time)
-    return {"name": THINGS[code], "position": list(place)}
-
-
-def _pot(pot: PotView, place: tuple[int, int], cook_time: int) -> dict[str, Any]:
-    full = pot.count == INGREDIENTS_PER_SOUP
-    return _soup(pot.onions, pot.tomatoes, pot.ticks if full else -1, place, cook_time)
-
-
-def _soup(onions: int, tomatoes: int, ticks: int, place: tuple[int, int], cook_time: int) -> dict[str, Any]:
-    idle = ticks < 0
-    names = ["onion"] * onions + ["tomato"] * tomatoes
-    return {
-        "name": "soup",
-        "position": list(place),
-        "_ingredients": [{"name": name, "position": list(place)} for name in names],
-        "cooking_tick": ticks,
-        "is_cooking": not idle and ticks < cook_time,
-        "is_ready": ticks >= cook_time,
-        "is_idle": idle,
-        "cook_time": -1 if idle else cook_time,
-        "_cooking_tick": ticks,
-    }
