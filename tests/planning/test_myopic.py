@@ -23,7 +23,8 @@ from galley.kitchen import (
     from_view,
 )
 from galley.planning.distances import distances
-from galley.planning.kernels.myopic_kernel import NOWHERE, target
+from galley.planning.kernels.myopic_kernel import target
+from galley.planning.kernels.needs_kernel import NOWHERE
 from galley.planning.myopic import Myopic
 from tests.kitchen.pots import pot_of
 from tests.planning.layouts import FORCED, MIXED, ROOM, layouts

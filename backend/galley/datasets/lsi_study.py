@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import ast
 import csv
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final

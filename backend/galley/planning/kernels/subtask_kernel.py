@@ -30,7 +30,7 @@ from galley.kitchen.codes import (
     TOMATO_DISPENSER,
 )
 from galley.kitchen.pots import is_soup, soup_of
-from galley.planning.kernels.myopic_kernel import (
+from galley.planning.kernels.needs_kernel import (
     drop_at,
     free_counter,
     must_pass,

@@ -28,7 +28,7 @@ from galley.kitchen.codes import (
 )
 from galley.kitchen.pots import amount_in, is_soup, soup_of, whole_soup
 from galley.planning.kernels.joint_kernel import FAR
-from galley.planning.kernels.myopic_kernel import open_order, pot_room, wanted_kind
+from galley.planning.kernels.needs_kernel import open_order, pot_room, wanted_kind
 from galley.planning.kernels.robot_kernel import Brain, cooks_for, task_of, way_alone, world_of
 from galley.planning.kernels.subtask_kernel import (
     DELIVER,
