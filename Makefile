@@ -71,7 +71,7 @@ $(ALL): pyproject.toml | $(PY)
 
 $(KERNELS): $(ALL) $(SOURCES)
 	@echo "Compiling kernels (a minute or two the first time) ..."
-	@$(PY) -m galley.agents.warm_up
+	@$(PY) -m galley.agents.all_kernels
 	@touch $@
 
 $(NODE): package.json

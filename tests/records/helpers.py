@@ -11,8 +11,8 @@ import numpy as np
 from galley.kitchen import Kitchen, Layout
 from galley.records import ClockRow, KeyRow, PauseRow, Store, TickRow, VisitRow
 from galley.records.reading.round_replay import state_bytes
-from galley.study.stages.kinds import ComparisonStep, ConsentStep, DebriefStep, Side
 from galley.study.stages.round_step import RoundStep
+from galley.study.stages.stage_kinds import ComparisonStep, ConsentStep, DebriefStep, Side
 from galley.study.visit.plan import Plan
 from galley.study.visit.steps import QuestionnaireStep
 

@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from pydantic.fields import FieldInfo
 
 from galley.files.reading import FileModel
-from galley.study.stages import kinds, rounds
+from galley.study.stages import rounds, stage_kinds
 from galley.study.written import factors, item_base, items, languages, questionnaire, recruitment
 from galley.study.written import study_file as config
 from tests.study.workspaces import ROOT
@@ -24,7 +24,7 @@ PAGE = ROOT / "docs" / "study-files.md"
 WORDS = ROOT / "tests" / "study" / "study-files.in.md"
 """The page without its tables: a line `{{ Model }}` stands for the table of a model."""
 
-STAGES = kinds.STAGE_KINDS
+STAGES = stage_kinds.STAGE_KINDS
 ITEMS = get_args(get_args(items.Item)[0])
 PARTS = (
     *(config.StudyFile, rounds.Kitchen, rounds.Lobby, factors.Factor, factors.Condition),
@@ -40,7 +40,7 @@ PARTS = (
 MODELS: dict[str, type[FileModel]] = {model.__name__: model for model in (*PARTS, *STAGES)}
 MODELS |= {f"Item{model.__name__}": model for model in ITEMS}
 COMMON = {
-    "Stage": kinds.Instructions.model_fields.keys() - {"kind", "text"},
+    "Stage": stage_kinds.Instructions.model_fields.keys() - {"kind", "text"},
     "Item": items.ShortText.model_fields.keys() - {"kind", "max_length"},
 }
 """Keys that stand in a table of their own, once for all stages and once for all items."""
@@ -77,7 +77,7 @@ def _table(name: str) -> str:
     if name == "Stages":
         return _stages()
     if name in COMMON:
-        model: type[FileModel] = kinds.Instructions if name == "Stage" else items.ShortText
+        model: type[FileModel] = stage_kinds.Instructions if name == "Stage" else items.ShortText
         fields = {key: field for key, field in model.model_fields.items() if key in COMMON[name]}
         return _rows(fields)
     return _rows(_own(MODELS[name]))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 import pydantic
 from ruamel.yaml import YAML
 
-from galley.agents.kinds import KINDS, Fault
+from galley.agents.agent_kinds import KINDS, Fault
 from galley.agents.network import Network, Sampling
 from galley.agents.protocol import Agent
 from galley.errors import GalleyError, InvalidFiles, Problem

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from galley.study.stages.kinds import STAGE_KINDS, STEP_TYPES
 from galley.study.stages.stage import Stage
+from galley.study.stages.stage_kinds import STAGE_KINDS, STEP_TYPES
 from galley.study.study import Study, load_study
 from galley.study.visit.plan import Plan, plan_visit
 from galley.study.visit.progress import Progress, Refusal, next_progress

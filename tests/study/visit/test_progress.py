@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from galley.outcomes import ROUND_OUTCOMES
-from galley.study.stages.kinds import STEP_TYPES
+from galley.study.stages.stage_kinds import STEP_TYPES
 from galley.study.visit.happenings import (
     Agreed,
     Continued,

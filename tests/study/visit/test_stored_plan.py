@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from galley.study.stages.kinds import STEP_TYPES
 from galley.study.stages.round_step import RoundStep
+from galley.study.stages.stage_kinds import STEP_TYPES
 from galley.study.visit.happenings import (
     Agreed,
     Continued,

@@ -38,8 +38,8 @@ from galley.records.rows import RoundRow, VisitRow
 from galley.records.store import queries
 from galley.records.store.store import Store
 from galley.study.scores import subscale_scores
-from galley.study.stages.kinds import ComparisonStep
 from galley.study.stages.round_step import RoundStep
+from galley.study.stages.stage_kinds import ComparisonStep
 from galley.study.visit.plan import Plan
 from galley.study.visit.steps import QuestionnaireStep, QuestionsStep, Step
 from galley.study.written.items import Item, stored_item

@@ -9,8 +9,8 @@ from typing import Any
 from galley.outcomes import TurnedAway
 from galley.server.participant.visits import Visit
 from galley.study.scores import wrong_items
-from galley.study.stages.kinds import DebriefStep, QuizStep
 from galley.study.stages.round_step import RoundStep
+from galley.study.stages.stage_kinds import DebriefStep, QuizStep
 from galley.study.study import Study
 from galley.study.visit.steps import QuestionsStep, Step, TextStep
 from galley.study.written.item_base import Answer

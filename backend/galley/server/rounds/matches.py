@@ -27,10 +27,9 @@ from galley.server.rounds.person import Person
 from galley.server.rounds.round_journal import RoundJournal
 from galley.server.rounds.round_kitchen import RoundKitchen
 from galley.server.rounds.round_spec import RoundSpec
-from galley.server.rounds.set_up import of_one, of_two
+from galley.server.rounds.set_up import of_one, of_two, round_at
 from galley.server.rounds.takeover import caught_up, ready_agent
 from galley.server.rounds.thinking import Mind, SlowMind, Thinking
-from galley.study.stages.round_step import RoundStep
 from galley.study.visit.happenings import RoundEnded
 
 LOG = logging.getLogger(__name__)
@@ -431,17 +430,6 @@ class Matches:
 
     def _lock(self, what: str, number: int) -> asyncio.Lock:
         return self._locks.setdefault((what, number), asyncio.Lock())
-
-
-def round_at(visit: Visit) -> RoundStep:
-    """The round that a visit is at.
-
-    Raises:
-        ValueError: it is at another step.
-    """
-    if visit.round is None:
-        raise ValueError(f"step '{visit.step.id}' is no round")
-    return visit.round
 
 
 def _with_agent(row: RoundRow) -> bool:

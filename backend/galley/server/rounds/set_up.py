@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 from galley.kitchen import Layout
 from galley.records import NewRound, SeatRow, VisitRow
+from galley.server.participant.visits import Visit
 from galley.study.stages.round_step import RoundStep
 from galley.study.visit.plan import Plan
 
@@ -14,6 +15,17 @@ from galley.study.visit.plan import Plan
 def round_layout(layouts: Mapping[str, Layout], step: RoundStep) -> Layout:
     """The layout of a round, with the round's length as its horizon."""
     return layouts[step.layout].with_rules(horizon_ticks=step.ticks)
+
+
+def round_at(visit: Visit) -> RoundStep:
+    """The round that a visit is at.
+
+    Raises:
+        ValueError: it is at another step.
+    """
+    if visit.round is None:
+        raise ValueError(f"step '{visit.step.id}' is no round")
+    return visit.round
 
 
 def of_one(

@@ -8,8 +8,8 @@ from typing import Any
 
 from numpy.random import SeedSequence
 
-from galley.study.stages.kinds import STEP_TYPES
 from galley.study.stages.stage import stage_ids
+from galley.study.stages.stage_kinds import STEP_TYPES
 from galley.study.study import Study
 from galley.study.visit.draft import Draft, seed_of
 from galley.study.visit.steps import Step

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from galley.outcomes import ENDED_FROM_OUTSIDE, ROUND_OUTCOMES, VisitStatus
-from galley.study.stages.kinds import QuizStep
+from galley.study.stages.stage_kinds import QuizStep
 from galley.study.visit.happenings import (
     Declined,
     Ended,

@@ -11,10 +11,10 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from galley.files.reading import FileModel, Loc, faults
 from galley.names import name_fix
-from galley.study.stages.kinds import AnyStage, Comparison, Consent, Debrief
 from galley.study.stages.round_step import InputMode
 from galley.study.stages.rounds import Rounds, TickMs, Ticks, Tutorial
 from galley.study.stages.stage import NamedKind, Stage, stage_ids
+from galley.study.stages.stage_kinds import AnyStage, Comparison, Consent, Debrief
 from galley.study.visit.counterbalance import MOST_SEQUENCES, permutations_count, sequences
 from galley.study.written.factors import (
     FACTOR_MARK,

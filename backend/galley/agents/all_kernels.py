@@ -1,4 +1,4 @@
-"""All kernels of kitchens, planners and agents compiled, once: `python -m galley.agents.warm_up`."""
+"""All kernels of kitchens, planners and agents compiled, once: `python -m galley.agents.all_kernels`."""
 
 from __future__ import annotations
 
