@@ -107,7 +107,7 @@ def create_app(content: Content, store: Store, settings: Settings, *, preview: b
     app.mount("/static", Static(directory=frontend), name="static")
     if settings.requests_per_s:
         app.add_middleware(PerAddress, per_s=settings.requests_per_s)
-    app.add_middleware(SecureHeaders)
+    app.add_middleware(SecureHeaders, framed_by=settings.framed_by)
     app.add_middleware(BasePath, base=settings.base_path)
 
     async def not_here(_request: Request, error: Exception) -> Response:

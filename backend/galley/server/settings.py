@@ -11,6 +11,7 @@ from galley.errors import GalleyError
 from galley.server.base_path import checked as checked_path
 
 REACHED_AT = re.compile(r"([A-Za-z0-9._-]+|\[[0-9A-Fa-f:.]+\]):[0-9]{1,5}")
+ORIGIN = re.compile(r"https?://[A-Za-z0-9.*-]+(:[0-9]{1,5})?")
 LOG_LEVELS = ("error", "warning", "info", "debug")
 
 
@@ -47,6 +48,11 @@ class Settings:
         "",
         "BASE_PATH",
         "Sub-path at which a proxy offers the site, such as /kitchen; empty takes `X-Forwarded-Prefix`.",
+    )
+    framed_by: str = _row(
+        "",
+        "FRAMED_BY",
+        "Origins whose pages may show participants' pages in a frame, with spaces between; empty lets none.",
     )
     study: str = _row("", "STUDY", "The one study to serve; empty serves all of the workspace.")
     think_window_ms: int = _row(
@@ -107,6 +113,10 @@ def _checked(setting: Setting, origin: str, value: Any) -> str | int:
     if setting.low is None or setting.high is None:
         if setting.name == "log_level" and value not in LOG_LEVELS:
             raise GalleyError(f"{origin}: '{value}' is no log level; use one of {', '.join(LOG_LEVELS)}")
+        if setting.name == "framed_by" and (
+            wrong := [one for one in str(value).split() if not ORIGIN.fullmatch(one)]
+        ):
+            raise GalleyError(f"{origin}: '{wrong[0]}' is no origin; write such as https://www.mturk.com")
         if setting.name == "base_path":
             return checked_path(str(value))
         if setting.name == "reached_at" and not REACHED_AT.fullmatch(str(value)):

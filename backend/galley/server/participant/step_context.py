@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from galley.outcomes import TurnedAway
+from galley.server.participant.hand_in import hand_in
 from galley.server.participant.visits import Visit
 from galley.study.scores import wrong_items
 from galley.study.stages.round_step import RoundStep
@@ -76,6 +77,7 @@ def step_context(
         case DebriefStep():
             end = visit.study.ending("completed", visit.row.link_params)
             context |= {"completion_code": end.code, "redirect": end.redirect}
+            context["hand_in"] = hand_in(visit.row.link_params, end.code)
         case RoundStep():
             context |= {"socket": f"{visit.url}/play", "next": visit.url, "minutes": step.seconds / 60}
     return context
@@ -86,7 +88,9 @@ def ending_context(visit: Visit) -> dict[str, Any]:
     outcome = visit.progress.status
     if outcome == "active":
         raise ValueError("this visit has not ended")
-    return _ending(visit.study, visit.study.ending(outcome, visit.row.link_params), test=visit.row.test)
+    end = visit.study.ending(outcome, visit.row.link_params)
+    handed = {"hand_in": hand_in(visit.row.link_params, end.code)}
+    return _ending(visit.study, end, test=visit.row.test) | handed
 
 
 def turned_away_context(study: Study, why: TurnedAway, params: Mapping[str, str]) -> dict[str, Any]:
