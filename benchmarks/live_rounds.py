@@ -32,6 +32,8 @@ import numpy as np
 import uvloop
 from websockets.asyncio.client import ClientConnection, connect
 
+from galley.protocol.messages import PROTOCOL
+
 ROOT = Path(__file__).resolve().parents[1]
 LAYOUTS = (
     "cramped_room",
@@ -112,13 +114,15 @@ stages:
 
 
 @contextmanager
-def server(workspace: Path, database: Path) -> Iterator[tuple[str, subprocess.Popen[str]]]:
+def server(
+    workspace: Path, database: Path, limited: bool = False
+) -> Iterator[tuple[str, subprocess.Popen[str]]]:
     """A server's URL and process, until the block ends."""
     command = [sys.executable, "-c", "from galley.cli import main; main()", "serve", str(workspace)]
     command += ["--port", "0", "--database", f"sqlite:///{database}"]
     # All people of a benchmark come from one address.
     no_limits = {"REQUESTS_PER_S": "0", "BEGINS_PER_MIN": "0", "ADDRESS_MESSAGES_PER_S": "1000000"}
-    environ = {**os.environ, **no_limits}
+    environ = {**os.environ, **({} if limited else no_limits)}
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environ) as process:
         try:
             assert process.stdout is not None
@@ -202,7 +206,7 @@ async def one_person(url: str, path: str, number: int, go: asyncio.Event, load: 
             url.replace("http", "ws") + f"{path}/play", compression=None, ping_interval=None, max_queue=None,
             open_timeout=60,
         ) as socket:  # fmt: skip
-            await socket.send(f'{{"type":"hello","protocol":1,"tab":"tab {number}"}}')
+            await socket.send(f'{{"type":"hello","protocol":{PROTOCOL},"tab":"tab {number}"}}')
             await go.wait()
             await asyncio.sleep(rng.uniform(0.0, START_WITHIN_S))
             await socket.send('{"type":"ready"}')
@@ -273,19 +277,22 @@ def control(load: Load, go: Any, found: Any) -> None:
 def play(
     load: Load,
     make_workspace: Callable[[Path, Load], list[str]],
-    watch: Callable[[int, float], None] = lambda _pid, _length_s: None,
+    watch: Callable[[int, float, str], None] = lambda _pid, _length_s, _url: None,
+    *,
+    limited: bool = False,
 ) -> Run:
     """Serve and play one load.
 
     `make_workspace` fills a folder and gives the names of its studies, which people take in turn. `watch` is
-    called with the server's process when all play, and how long they will.
+    called with the server's process when all play, how long they will, and its URL. The server sets no limits
+    by address unless it is `limited`.
     """
     context = multiprocessing.get_context("spawn")
     with tempfile.TemporaryDirectory(prefix="galley-rounds-") as name:
         folder = Path(name)
         studies = make_workspace(folder, load)
         database = folder / "records.sqlite"
-        with server(folder, database) as (url, process):
+        with server(folder, database, limited) as (url, process):
             idle_mib = memory_mib(process.pid, "VmRSS")
             here, found, go = context.Queue(), context.Queue(), context.Event()
             jobs = [(number, studies[number % len(studies)]) for number in range(load.rounds)]
@@ -302,7 +309,7 @@ def play(
             time.sleep(2 * START_WITHIN_S)
             pids = [process.pid, *(int(worker.pid or 0) for worker in workers[:-1])]
             before, began_s = [cpu_s(pid) for pid in pids], time.monotonic()
-            watch(process.pid, load.length_s)
+            watch(process.pid, load.length_s, url)
             time.sleep(load.length_s * 0.7)
             spent_s = time.monotonic() - began_s
             shares = [(cpu_s(pid) - cpu) / spent_s for pid, cpu in zip(pids, before, strict=True)]

@@ -111,7 +111,7 @@ def profiled(load: Load, profile: Path | None) -> Run:
     """One load; with `profile`, py-spy writes there what the server was at."""
     spies: list[subprocess.Popen[bytes]] = []
 
-    def spy(pid: int, length_s: float) -> None:
+    def spy(pid: int, length_s: float, _url: str) -> None:
         command = [str(Path(sys.executable).with_name("py-spy")), "record", "--pid", str(pid), "--threads"]
         command += ["--rate", "200", "--duration", str(max(1, int(length_s * 0.6)))]
         command += ["--format", "raw", "--output", str(profile)]

@@ -15,6 +15,8 @@ PREFIX_V6: Final = 64
 
 MOST_KEPT: Final = 10_000
 LONGEST_QUEUE_S: Final = 10.0
+REFUSED_AFTER_S: Final = 1.0
+"""How late a refusal comes, so that those who ask again at once do not ask more often."""
 
 
 class Pace:
@@ -103,6 +105,7 @@ class PerAddress:
                 if wait_s > LONGEST_QUEUE_S:
                     headers = {"retry-after": str(round(wait_s) + 1)}
                     refusal = PlainTextResponse("Too many requests; wait a moment.", 429, headers)
+                    await asyncio.sleep(REFUSED_AFTER_S)
                     await refusal(scope, receive, send)
                     return
                 if wait_s > 0:

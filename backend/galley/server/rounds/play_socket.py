@@ -26,7 +26,7 @@ from galley.protocol.messages import (
     Release,
 )
 from galley.server.headers import same_origin, tell_foreign
-from galley.server.limits import Pace, Paces, network_of
+from galley.server.limits import REFUSED_AFTER_S, Pace, Paces, network_of
 from galley.server.participant.visits import Visits
 from galley.server.rounds.match import LEFT, RESTART
 from galley.server.rounds.matches import Matches, Place, RoundBusy
@@ -142,6 +142,7 @@ class Play:
         """One connection from handshake to close; a foreign page or an unknown link gets 403."""
         now_s = asyncio.get_running_loop().time()
         if self._arrivals.of(token, now_s).wait_s(now_s, patience_s=0.0) > 0:
+            await asyncio.sleep(REFUSED_AFTER_S)
             await websocket.send_denial_response(Response(status_code=429))
             return
         if not same_origin(websocket.headers):
