@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal
 
@@ -125,16 +126,32 @@ def _row_line(file: Loaded[LayoutFile], row: int | None) -> int:
     return file.line("grid") if row is None else file.text_line("grid", row=row)
 
 
+def layout_remarks(path: Path, shown: str) -> list[Problem]:
+    """What is no mistake in a layout's file: stations out of reach whose kind can be reached elsewhere.
+
+    Raises:
+        InvalidFiles: all that is a mistake.
+    """
+    file, layout = _read(path, shown)
+    return [problem for problem, spare in _out_of_reach(file, layout) if spare]
+
+
+def _out_of_reach(file: Loaded[LayoutFile], layout: Layout) -> Iterator[tuple[Problem, bool]]:
+    """Each station that no chef can reach, and whether others of its kind can be reached."""
+    reached = frozenset().union(*reachable_stations(layout))
+    for tile, name in STATIONS.items():
+        places = layout.places(tile)
+        spare = any(place in reached for place in places)
+        for x, y in places:
+            if (x, y) not in reached:
+                told = f"the {name} at column {x + 1} cannot be reached by any chef"
+                fix = "open floor beside it or remove it"
+                yield Problem(file.path, _row_line(file, y), told, fix), spare
+
+
 def _station_problems(file: Loaded[LayoutFile], layout: Layout) -> list[Problem]:
     """Stations that no chef can reach, and kinds of station without which no soup can be served."""
-    problems = []
-    reached = reachable_stations(layout)
-    for tile, name in STATIONS.items():
-        for x, y in layout.places(tile):
-            if not any((x, y) in seat for seat in reached):
-                told = f"the {name} at column {x + 1} cannot be reached by any chef"
-                line = _row_line(file, y)
-                problems.append(Problem(file.path, line, told, "open floor beside it or remove it"))
+    problems = [problem for problem, spare in _out_of_reach(file, layout) if not spare]
     ingredients = [*layout.onions, *layout.tomatoes]
     wanted = set(layout.rules.orders or ())
     missing = [

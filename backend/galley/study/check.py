@@ -12,7 +12,20 @@ from galley.study.written.recruitment import load_invitations
 from galley.study.written.texts import load_text
 from galley.workspace import KINDS, NAME, Workspace
 
-__all__ = ["check_workspace", "describe"]
+__all__ = ["check_study", "check_workspace", "describe"]
+
+
+def check_study(workspace: Workspace, name: str) -> list[Problem]:
+    """All problems of one study and of what it names, each once and in order.
+
+    Raises:
+        GalleyError: the workspace has no such study.
+    """
+    try:
+        load_study(workspace, name)
+    except InvalidFiles as invalid:
+        return list(invalid.problems)
+    return []
 
 
 def check_workspace(workspace: Workspace) -> list[Problem]:
