@@ -19,11 +19,17 @@ VisitOutcome = Literal[
     "timed_out",
     "expired",
     "partner_missing",
+    "interrupted",
 ]
 VISIT_OUTCOMES: Final[tuple[VisitOutcome, ...]] = get_args(VisitOutcome)
 """How a visit may end."""
 
-ENDED_FROM_OUTSIDE: Final[tuple[VisitOutcome, ...]] = ("timed_out", "expired", "partner_missing")
+ENDED_FROM_OUTSIDE: Final[tuple[VisitOutcome, ...]] = (
+    "timed_out",
+    "expired",
+    "partner_missing",
+    "interrupted",
+)
 """How a visit may end wherever it is."""
 
 NoRoom = Literal["full", "later", "paused", "closed"]

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from galley.commands.options import WorkspaceArgument
 from galley.errors import InvalidFiles
+
+if TYPE_CHECKING:
+    from galley.workspace import Workspace
 
 
 def check(
@@ -49,4 +52,22 @@ def check(
     counts = ", ".join(
         f"{len(place.names(kind))} {kind}" for kind in ("layouts", "agents", "questionnaires", "studies")
     )
+    for line in changed_under_way(place):
+        typer.echo(line)
     typer.echo(f"No problems in {counts}.")
+
+
+def changed_under_way(place: Workspace) -> list[str]:
+    """What visits under way in the workspace's own database need that is gone, a line for each study."""
+    from galley.agents.catalogue import Catalogue
+    from galley.kitchen.layout_file import load_layouts
+    from galley.records import Store
+    from galley.server.changed_files import kept_by, told_of_changes
+    from galley.study.study import load_study
+
+    if not Path(place.database).is_file():
+        return []
+    studies = {name: load_study(place, name) for name in place.names("studies")}
+    has = kept_by(load_layouts(place), Catalogue(place))
+    with Store.open(place.database) as store:
+        return store.read(lambda connection: list(told_of_changes(connection, studies, has))).result()

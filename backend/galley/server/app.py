@@ -16,6 +16,7 @@ from starlette.types import Scope
 from galley.errors import GalleyError
 from galley.records import Store
 from galley.server.base_path import BasePath
+from galley.server.changed_files import kept_by
 from galley.server.clock import Clock
 from galley.server.content import Content
 from galley.server.garbage_collection import collect_between_rounds, few_collections
@@ -52,7 +53,8 @@ def create_app(content: Content, store: Store, settings: Settings, *, preview: b
     clock = Clock()
     thinking = Thinking(settings.think_window_ms / 1000.0)
     catalogues = Catalogues.load()
-    visits = Visits(store, studies, clock, catalogues, preview=preview)
+    has = kept_by(content.layouts, content.agents)
+    visits = Visits(store, studies, clock, catalogues, has, preview=preview)
     matches = Matches(store, visits, content.agents, content.layouts, thinking, clock, settings.reached_at)
     frontend = frontend_folder()
     environment = translated_templates(str(frontend / "templates"), catalogues)
@@ -120,7 +122,8 @@ def create_app(content: Content, store: Store, settings: Settings, *, preview: b
         response.headers["retry-after"] = AWAY_RETRY_S
         return response
 
-    async def broken(_request: Request, _error: Exception) -> Response:
+    async def broken(request: Request, _error: Exception) -> Response:
+        await pages.tell_broken(request.url.path)
         response = pages.plain(500, WRONG, BROKEN)
         # This page is made outside of the middleware.
         response.headers.update(HEADERS)

@@ -19,6 +19,7 @@ from fastapi import FastAPI
 from galley.errors import GalleyError
 from galley.records import Store
 from galley.server.app import create_app
+from galley.server.changed_files import kept_by, told_of_changes
 from galley.server.content import load_content
 from galley.server.logs import log_to
 from galley.server.request_bounds import BoundedHttp
@@ -26,6 +27,7 @@ from galley.server.settings import Settings, read_settings
 from galley.server.socket_bounds import BoundedWebSocket
 from galley.workspace import Workspace
 
+LOG = logging.getLogger(__name__)
 MAX_FRAME_BYTES = 256 * 1024
 PING_EVERY_S = 5.0
 PING_WITHIN_S = 10.0
@@ -90,7 +92,12 @@ def _serve(workspace: Workspace, settings: Settings, database: str, *, preview: 
             known = replace(
                 settings, reached_at=settings.reached_at or reached_at(listening, store.engine.url)
             )
-            app = create_app(load_content(workspace, known.study), store, known, preview=preview)
+            content = load_content(workspace, known.study)
+            has = kept_by(content.layouts, content.agents)
+            told = store.read(lambda connection: list(told_of_changes(connection, content.studies, has)))
+            for line in told.result():
+                LOG.warning(line)
+            app = create_app(content, store, known, preview=preview)
             # A thread that wants the interpreter gets it sooner: a tick waits less for an agent that thinks
             # in Python.
             sys.setswitchinterval(SWITCH_INTERVAL_S)

@@ -99,9 +99,11 @@ class Study:
         return replace(self, quoted=self.by_condition.get(levels, self.quoted))
 
     def questionnaire_for(self, step: QuestionsStep) -> Questionnaire:
-        """The questionnaire of a step, its items in the order that the visit's plan gives them."""
+        """The questionnaire of a step, with the order and the right answers of the visit's plan."""
         questionnaire = self.questionnaires[step.questionnaire]
-        return questionnaire if step.item_order is None else questionnaire.arranged(step.item_order)
+        if step.item_order is not None:
+            questionnaire = questionnaire.arranged(step.item_order)
+        return questionnaire.expecting(step.expected)
 
     def ending(self, outcome: VisitOutcome | TurnedAway, link_params: Mapping[str, str]) -> Ending:
         """What a visit that ended so, or could not begin, is shown.

@@ -24,6 +24,7 @@ FLAGS: Final = {
     "hidden_tab": "the page was hidden for more than a minute in all",
     "failed_checks": "an attention check was not answered as expected",
     "no_id": "the link held a placeholder where the recruiter should have put a person's id",
+    "interrupted": "the visit ended early because a file that it needs was changed or removed",
     "slow_client": "in some round, half of all round trips took more than 300 ms",
 }
 """Every kind of flag and what it means."""
@@ -46,7 +47,7 @@ def flags(
     if not tests:
         these = these & ~VISITS.c.test
     found: dict[int, list[Flag]] = defaultdict(list)
-    for rule in (_late, _hidden, _failed, _unnamed, _slow):
+    for rule in (_late, _hidden, _failed, _unnamed, _interrupted, _slow):
         for visit, flag in rule(connection, these):
             found[visit].append(flag)
     return {visit: tuple(of_visit) for visit, of_visit in sorted(found.items())}
@@ -96,6 +97,12 @@ def _unnamed(connection: Connection, these: ColumnElement[bool]) -> Found:
             if is_placeholder(value, name):
                 yield visit, Flag("no_id", 1.0, f"{name} was {value[:40]!r}")
                 break
+
+
+def _interrupted(connection: Connection, these: ColumnElement[bool]) -> Found:
+    query = select(VISITS.c.id).where(these, VISITS.c.status == "interrupted")
+    for visit in connection.execute(query).scalars():
+        yield visit, Flag("interrupted", 1.0, "a file that it needs was changed or removed")
 
 
 def _slow(connection: Connection, these: ColumnElement[bool]) -> Found:

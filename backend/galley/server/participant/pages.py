@@ -51,6 +51,10 @@ UNKNOWN_LINK = mark(
     "This link is not known here. Please check that it is complete, "
     "or begin again from the link you were sent."
 )
+NOT_SERVED = mark("This study is not open here any more")
+ANSWERS_STAY = mark(
+    "What you answered so far is stored. You did nothing wrong; please tell the researchers who invited you."
+)
 NO_PAGE = mark("There is no page at this address. Please check that the link is complete.")
 FOREIGN = mark("This form was sent from another site, so it was not used.")
 UNREADABLE = mark("This form could not be read, so nothing was changed.")
@@ -200,7 +204,7 @@ class Pages:
         """The page of the step that the visit is at."""
         visit = await self._visits.find(token)
         if visit is None:
-            return self.plain(404, UNKNOWN, UNKNOWN_LINK)
+            return await self._no_visit(token)
         overdue = self._visits.overdue(visit)
         if overdue is not None:
             await time_is_up(self._visits, self._matches, visit, overdue)
@@ -263,7 +267,7 @@ class Pages:
             return self.plain(403, NOT_USED, FOREIGN)
         visit = await self._visits.find(token)
         if visit is None:
-            return self.plain(404, UNKNOWN, UNKNOWN_LINK)
+            return await self._no_visit(token)
         language = visit.row.language
         try:
             form = await read_form(request, self._max_form_bytes)
@@ -283,6 +287,21 @@ class Pages:
         else:
             return await self._answered(visit, form) or on
         return on
+
+    async def _no_visit(self, token: str) -> Response:
+        if await self._visits.unserved(token):
+            return self.plain(410, NOT_SERVED, ANSWERS_STAY)
+        return self.plain(404, UNKNOWN, UNKNOWN_LINK)
+
+    async def tell_broken(self, path: str) -> None:
+        """Log which visit's page, at this path, could not be built: its number, never its link."""
+        token = path.rpartition("/v/")[2].partition("/")[0]
+        try:
+            visit = await self._visits.find(token) if "/v/" in path else None
+        except Exception:  # what broke the page may break this too
+            return
+        if visit is not None:
+            LOG.error("the page of visit %d at step '%s' could not be built", visit.row.id, visit.step.id)
 
     async def _answered(self, visit: Visit, form: Mapping[str, list[str]]) -> Response | None:
         """The page again when something is missing or it is too early; None once the form is used."""

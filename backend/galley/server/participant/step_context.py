@@ -114,6 +114,8 @@ def _ending(study: Study, end: Ending, *, test: bool) -> dict[str, Any]:
 
 
 def _html(visit: Visit, text: str | None) -> str | None:
+    if isinstance(visit.step, DebriefStep) and text not in visit.study.texts:
+        text = visit.study.ending("completed", {}).text
     return None if text is None else visit.study.texts[text].html
 
 

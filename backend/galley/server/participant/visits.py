@@ -11,6 +11,7 @@ from weakref import WeakValueDictionary
 
 from galley.outcomes import TurnedAway
 from galley.records import Arrival, Planned, Store, VisitRow
+from galley.records.store import queries
 from galley.records.store.links_for_tests import LinkForTests, LinksForTests
 from galley.records.store.visit_state import Attempt, visit_state
 from galley.server.clock import Clock
@@ -26,6 +27,7 @@ from galley.study.visit.condition_slots import (
     cells,
     slot_in_cell,
 )
+from galley.study.visit.gone import Has, gone
 from galley.study.visit.happenings import Agreed, Ended, Happening, TimedOut
 from galley.study.visit.plan import Plan, plan_visit, visit_seed
 from galley.study.visit.progress import Progress, Refusal, next_progress, position
@@ -128,6 +130,7 @@ class Visits:
         studies: Mapping[str, Study],
         clock: Clock,
         catalogues: Catalogues,
+        has: Has,
         *,
         preview: bool = False,
     ) -> None:
@@ -135,6 +138,7 @@ class Visits:
         self._studies = studies
         self._clock = clock
         self._catalogues = catalogues
+        self._has = has
         self._preview = preview
         self._locks: WeakValueDictionary[int, asyncio.Lock] = WeakValueDictionary()
 
@@ -245,7 +249,42 @@ class Visits:
         return self._catalogues.translator(language)
 
     async def find(self, token: str) -> Visit | None:
-        """The visit behind a link; None when there is none or its study is not served."""
+        """The visit behind a link; None when there is none or its study is not served.
+
+        A visit whose step needs a file that is gone ends here, as interrupted.
+        """
+        visit = await self._stored(token)
+        missing = () if visit is None or not visit.active else gone(visit.study, visit.step, self._has)
+        if visit is None or not missing or await self._goes_on(visit, missing):
+            return visit
+        LOG.error(
+            "visit %d of study %s ended as interrupted at step '%s', which needs what is gone: %s",
+            visit.row.id,
+            visit.row.study,
+            visit.step.id,
+            ", ".join(missing),
+        )
+        await self.happened(visit, Ended(visit.step.id, "interrupted"))
+        return await self._stored(token)
+
+    async def unserved(self, token: str) -> bool:
+        """Whether a link is that of a visit whose study is not served any more."""
+        found = await asyncio.wrap_future(self._store.read(lambda connection: visit_state(connection, token)))
+        return found is not None and found.visit.study not in self._studies
+
+    async def _goes_on(self, visit: Visit, missing: Sequence[str]) -> bool:
+        """Whether the round that a visit is at has begun and all who play it are there."""
+        at_step = visit.row.id, visit.step.id
+        row = await asyncio.wrap_future(
+            self._store.read(lambda connection: queries.round_of(connection, *at_step))
+        )
+        if row is None:
+            return False
+        seated = {f"agent {seat.agent}" for seat in row.seats if seat.agent is not None}
+        return seated.isdisjoint(missing)
+
+    async def _stored(self, token: str) -> Visit | None:
+        """The visit behind a link as its records say."""
         found = await asyncio.wrap_future(self._store.read(lambda connection: visit_state(connection, token)))
         study = None if found is None else self._studies.get(found.visit.study)
         if found is None or study is None:
@@ -297,7 +336,7 @@ class Visits:
         """Whether the visit changed by this; what came twice, late or early changes nothing."""
         lock = self._locks.setdefault(visit.row.id, asyncio.Lock())
         async with lock:
-            now = await self.find(visit.row.token)
+            now = await self._stored(visit.row.token)
             if now is None:
                 return False
             if now.attempt is not None and answers is not None and now.attempt.answers == answers:

@@ -47,9 +47,25 @@ class Questionnaire(FileModel):
         return {item.id: item.right for item in self.items if item.right is not None}
 
     def arranged(self, item_order: Sequence[str]) -> Questionnaire:
-        """The same questionnaire with its items in this order of their ids."""
+        """The same questionnaire with those of its items that have these ids, in this order."""
         by_id = {item.id: item for item in self.items}
-        return self.model_copy(update={"items": tuple(by_id[name] for name in item_order)})
+        return self.model_copy(update={"items": tuple(by_id[name] for name in item_order if name in by_id)})
+
+    def expecting(self, right: Mapping[str, Any]) -> Questionnaire:
+        """The same questionnaire with these right answers, by item, in place of its own."""
+        if right == self.expected:
+            return self
+        items = (
+            item.model_copy(update={"expected": _frozen(right.get(item.id))})
+            if hasattr(item, "expected")
+            else item
+            for item in self.items
+        )
+        return self.model_copy(update={"items": tuple(items)})
+
+
+def _frozen(answer: Any) -> Any:
+    return tuple(answer) if isinstance(answer, list) else answer
 
 
 def load_questionnaire(

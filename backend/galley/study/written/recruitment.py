@@ -78,6 +78,8 @@ class Endings(FileModel):
     """The visit was away too long and its slot was given to someone else."""
     partner_missing: EndingFile = EndingFile()
     """Nobody came to play with."""
+    interrupted: EndingFile = EndingFile()
+    """The visit needs a file that was changed or removed after it began."""
     full: EndingFile = EndingFile()
     """No visit began: all visits that are wanted are completed."""
     later: EndingFile = EndingFile()
