@@ -101,7 +101,7 @@ def test_f3_an_item_is_gone_and_the_visit_goes_on(lab: Workspace, tmp_path: Path
         assert person.submit({"a": "1", "b": "2"}).status_code == 200
         assert person.stage == "instructions"
         rows = served.store.read(lambda connection: connection.execute(RESPONSES.select()).all()).result()
-        assert {row.item_id for row in rows} == {"a", "b"}
+        assert {row.item for row in rows} == {"a", "b"}
 
 
 def test_a1_an_item_is_new_and_old_visits_are_not_asked(lab: Workspace, tmp_path: Path) -> None:
