@@ -34,12 +34,13 @@ HANDSHAKE = (
 )
 HEADER_BYTES = (1_000, 10_000, 100_000, 1_000_000, 20_000_000, 200_000_000)
 SOCKETS = 200
+KINDS = ["headers", "drip", "visits", "sockets"]
 DRIPPING = 50
 BEGINNING = 20
 
 
-def attack(url: str, length_s: float) -> None:
-    """Do all of it for so long."""
+def attack(url: str, length_s: float, only: list[str]) -> None:
+    """Do these kinds of it for so long."""
     path = begin(url, "mine")
     place = urllib.parse.urlsplit(url)
 
@@ -85,8 +86,13 @@ def attack(url: str, length_s: float) -> None:
             await asyncio.sleep(0.02)
 
     async def everything() -> None:
-        acts = [lambda size=size: headers(size) for size in HEADER_BYTES]
-        acts += [drip] * DRIPPING + [visits] * BEGINNING + [flood] * SOCKETS
+        kinds = {
+            "headers": [lambda size=size: headers(size) for size in HEADER_BYTES],
+            "drip": [drip] * DRIPPING,
+            "visits": [visits] * BEGINNING,
+            "sockets": [flood] * SOCKETS,
+        }
+        acts = [act for name in only for act in kinds[name]]
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(length_s):
                 await asyncio.gather(*(again(act) for act in acts))
@@ -99,6 +105,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--ticks", type=int, default=200, help="ticks of each round")
+    parser.add_argument("--only", nargs="+", choices=KINDS, default=KINDS, help="these kinds alone")
     parser.add_argument("--peace", action="store_true", help="the same without the bad client")
     options = parser.parse_args()
     load = Load(rounds=20, ticks=options.ticks, tick_ms=150, clients=1)
@@ -113,7 +120,7 @@ def main() -> int:
     def watch(_pid: int, length_s: float, url: str) -> None:
         if not options.peace:
             context = multiprocessing.get_context("spawn")
-            context.Process(target=attack, args=(url, length_s * 0.6), daemon=True).start()
+            context.Process(target=attack, args=(url, length_s * 0.6, options.only), daemon=True).start()
 
     run = play(load, workspace, watch, limited=True)
     own, bare = run.lateness(99), run.control_lateness(99)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import math
 from collections.abc import Mapping, Sequence
@@ -17,7 +18,7 @@ from galley.records import Store
 from galley.server.clock import Clock
 from galley.server.form_decoding import FormError, read_form
 from galley.server.headers import names_host, same_origin
-from galley.server.limits import Paces, network_of
+from galley.server.limits import REFUSED_AFTER_S, Paces, network_of
 from galley.server.participant.step_context import (
     common_context,
     ending_context,
@@ -174,6 +175,7 @@ class Pages:
         language = chosen if chosen in found.languages else _language(found, request)
         wait_s = self._begin_wait_s(request)
         if wait_s > 0:
+            await asyncio.sleep(REFUSED_AFTER_S)
             page = self.plain(429, NOT_YET, CROWDED, language)
             page.headers["retry-after"] = str(math.ceil(wait_s))
             return page
