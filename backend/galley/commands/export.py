@@ -33,11 +33,16 @@ def export(
             help="Also write human-data.csv: every tick in the field's public schema of human games.",
         ),
     ] = False,
+    bonuses: Annotated[
+        bool,
+        typer.Option("--bonuses", help="Also write bonuses.csv: participant_id,amount, to pay in bulk."),
+    ] = False,
     tests: Annotated[bool, typer.Option("--tests", help="Include visits made to try the study out.")] = False,
     workspace: WorkspaceOption = Path(),
     database: DatabaseOption = None,
 ) -> None:
     """Write participants, rounds, ticks, responses and events as CSV, with their data dictionary."""
+    from galley.records.export.bonus_payments import export_bonuses
     from galley.records.export.study_export import export_study
     from galley.records.export.trajectory_export import export_human_data, export_trajectories
     from galley.records.store.store import Store
@@ -55,5 +60,8 @@ def export(
         if human_data:
             file = out / "human-data.csv"
             written[file] = f"{export_human_data(store, study, file, tests)} rows"
+        if bonuses:
+            file = out / "bonuses.csv"
+            written[file] = f"{export_bonuses(store, study, file, tests)} people"
     for file, count in written.items():
         typer.echo(f"{file}: {count}")

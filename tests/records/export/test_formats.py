@@ -17,6 +17,8 @@ from galley.records.export.columns import SHEETS
 from galley.records.export.human_data import HUMAN_DATA
 from galley.records.export.study_export import export_study
 from galley.records.export.trajectory_export import export_human_data, export_trajectories
+from galley.study.stages.round_step import RoundStep
+from galley.study.visit.plan import Plan
 from tests.overcooked_package import mdp
 from tests.records.export.test_study_export import whole_visit
 from tests.records.helpers import START_MS, begin, joint_actions, one_soup, open_round, play
@@ -96,21 +98,38 @@ def test_tests_are_left_out_unless_asked_for(store: Store, tmp_path: Path) -> No
     assert export_trajectories(store, "demo", tmp_path / "b.zip", include_test=True) == 1
 
 
-def test_a_round_for_two_is_told_once(store: Store, tmp_path: Path) -> None:
+def test_d6_d7_a_round_for_two_is_told_by_each_with_the_hats_that_they_saw(
+    store: Store, tmp_path: Path
+) -> None:
     ada, bob = begin(store), begin(store)
     round_id = store.set_up_round(shared(ada, bob)).result()
     finish(store, round_id, [one_soup()], "finished")
     export_study(store, "demo", tmp_path)
-    (row,) = read_csv(tmp_path / "rounds.csv")
-    assert (row["participant"], row["partner_participant"], row["agent"]) == (
-        ada.participant,
-        bob.participant,
-        "",
-    )
-    assert (row["replays"], row["human_served"], row["partner_served"]) == ("true", "1", "0")
+    rows = read_csv(tmp_path / "rounds.csv")
+    assert [(row["participant"], row["partner_participant"], row["agent"]) for row in rows] == [
+        (ada.participant, bob.participant, ""),
+        (bob.participant, ada.participant, ""),
+    ]
+    assert {row["round_id"] for row in rows} == {str(round_id)}
+    assert {row["dyad"] for row in rows} == {f"{ada.visit_no}+{bob.visit_no}"}
+    assert [row["human_seat"] for row in rows] == ["0", "1"]
+    for row, visit in zip(rows, (ada, bob), strict=True):
+        (step,) = (step for step in Plan.from_json(visit.plan_json).steps if step.id == row["step"])
+        assert isinstance(step, RoundStep)
+        assert row["partner_hat"] == step.partner_hat
+    sides = [(row["replays"], row["human_served"], row["partner_served"]) for row in rows]
+    assert sides == [("true", "1", "0"), ("true", "0", "1")]
+    for kind in ("jsonl", "parquet"):
+        export_study(store, "demo", tmp_path / kind, (kind,))
+    lines = [json.loads(line) for line in (tmp_path / "jsonl" / "rounds.jsonl").read_text().splitlines()]
+    assert [line["dyad"] for line in lines] == [row["dyad"] for row in rows]
+    assert [line["human_served"] for line in lines] == [1, 0]
+    table = pyarrow.parquet.read_table(tmp_path / "parquet" / "rounds.parquet")
+    assert table["dyad"].to_pylist() == [row["dyad"] for row in rows]
     assert len(read_csv(tmp_path / "ticks.csv")) == 40
     both = read_csv(tmp_path / "wide.csv")
     assert [one["rounds-1.score"] for one in both] == ["20", "20"]
+    assert [one["rounds-1.dyad"] for one in both] == [row["dyad"] for row in rows]
     assert [one["rounds_finished"] for one in read_csv(tmp_path / "participants.csv")] == ["1", "1"]
 
 

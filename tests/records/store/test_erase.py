@@ -163,6 +163,7 @@ def test_a_round_for_two_stays_the_others(store: Store, database: Database, tmp_
         "",
         "1",
     )
+    assert told["dyad"] == f"{bob.visit_no}+erased"
     assert export_human_data(store, "demo", tmp_path / "human.csv") == 40
     assert erase_participant(store, bob.id) == Erased(1, 1)
     assert database.rows("SELECT count(*) FROM ticks") == [(0,)]

@@ -77,6 +77,15 @@ _ABOUT: Final = (
     Field("agent", "text", "the agent of that round"),
     Field("partner_hat", "text", "colour of that agent's hat"),
 )
+_DYAD: Final = Field(
+    "dyad",
+    "text",
+    "the two people of the round, by the numbers of their visits, lower first; empty with an agent",
+)
+_BONUS: Final = (
+    Field("bonus", "number", "what was earned: the bonus of every goal reached; empty if there was none"),
+    Field("bonus_unit", "text", "the unit of that"),
+)
 
 
 def _chef(name: str) -> Iterator[Field]:
@@ -117,6 +126,7 @@ PARTICIPANTS: Final = Sheet(
         Field("hidden_s", "number", "seconds that the page was hidden behind another tab or window"),
         Field("rounds_finished", "whole number", "rounds played to their end, tutorials left out"),
         Field("rounds_abandoned", "whole number", "rounds left before their end, tutorials left out"),
+        *_BONUS,
     ),
 )
 
@@ -151,8 +161,8 @@ MEASURES: Final = (
 
 ROUNDS_SHEET: Final = Sheet(
     "rounds",
-    "One row per round, with its outcome and the measures of coordination; a round for two people has one "
-    "row, under the visit with the lower seat.",
+    "One row per person and round, with its outcome and the measures of coordination; a round for two people "
+    "has a row for each of them, from their side, with one round_id and dyad.",
     "visit_no, round_id",
     (
         *_WHO,
@@ -167,14 +177,14 @@ ROUNDS_SHEET: Final = Sheet(
         Field(
             "partner_participant",
             "text",
-            "the other participant of a round for two, who has no row of their own for it; empty if erased",
+            "the other participant of a round for two, who has a row of their own for it; empty if erased",
         ),
         Field("stand_in", "text", "name of the agent that took the seat of a person who left"),
         Field("stand_in_seat", "whole number", "that seat"),
         Field("stand_in_tick", "whole number", "first tick that it played"),
         Field("human_seat", "whole number", "seat of the participant"),
         Field("human_hat", "text", "colour of the participant's hat"),
-        Field("partner_hat", "text", "colour of the partner's hat"),
+        Field("partner_hat", "text", "colour of the partner's hat, as this participant saw it"),
         _as_in(ROUNDS.c.seed, "text"),
         _as_in(ROUNDS.c.horizon_ticks, "whole number"),
         _as_in(ROUNDS.c.episodes, "whole number"),
@@ -202,12 +212,14 @@ ROUNDS_SHEET: Final = Sheet(
             "the stored actions replay to the stored end; if not, the measures are empty",
         ),
         *MEASURES,
+        _DYAD,
+        *_BONUS,
     ),
 )
 
 TICKS_SHEET: Final = Sheet(
     "ticks",
-    "One row per tick.",
+    "One row per tick; of a round for two people under the visit with the lower seat.",
     "visit_no, round_id, tick",
     (
         _WHO[0],
@@ -309,6 +321,7 @@ RESPONSES_SHEET: Final = Sheet(
             "number",
             "what the answer counts there: its value, turned round where the item is reversed",
         ),
+        _DYAD,
     ),
 )
 
@@ -326,6 +339,7 @@ SUBSCALES_SHEET: Final = Sheet(
         Field("answered", "whole number", "those of them that were answered"),
         Field("mean", "number", "mean of the items' subscale_value; empty unless all of them were answered"),
         *_ABOUT,
+        _DYAD,
     ),
 )
 
@@ -393,6 +407,8 @@ ROUND_COLUMNS: Final = (
     Field("status", "text", str(ROUNDS.c.status.doc)),
     Field("score", "whole number", str(ROUNDS.c.score.doc)),
     Field("deliveries", "whole number", str(ROUNDS.c.deliveries.doc)),
+    _DYAD,
+    _BONUS[0],
 )
 
 WIDE: Final = Sheet(

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
-from sqlalchemy import Connection
+from sqlalchemy import Connection, select
 
 from galley.errors import GalleyError
 from galley.kitchen import ACTIONS
-from galley.records.database.tables import CLOCKS, KEYS, PAUSES, TICKS
+from galley.records.database.tables import CLOCKS, KEYS, PAUSES, TICKS, VISITS
 from galley.records.export.columns import (
     CLOCKS_SHEET,
     EVENTS_SHEET,
@@ -37,16 +37,26 @@ class TableFile(Protocol):
 
 
 class RoundExport:
-    """Writes everything about one round that a visit played.
+    """Writes everything about one round that a visit played, as seen from its seat.
 
-    `step` is the one it was played at, `at` what the visit adds to every row.
+    `step` is the one it was played at, `at` what the visit adds to every row, `dyad` names the two people.
     """
 
-    def __init__(self, connection: Connection, row: RoundRow, step: RoundStep, at: Mapping[str, Any]) -> None:
+    def __init__(
+        self,
+        connection: Connection,
+        row: RoundRow,
+        visit_id: int,
+        step: RoundStep,
+        at: Mapping[str, Any],
+        dyad: str | None,
+    ) -> None:
         self.row = row
+        self.dyad = dyad
         self.step = step
         self.at = {**at, "round_id": row.id, "round_no": row.round_no}
-        self.human, self.partner = row.human, row.partner
+        mine = row.seats[0].visit_id == visit_id
+        self.human, self.partner = row.seats if mine else row.seats[::-1]
         self.ticks: Rows = queries.of_round(connection, TICKS, row.id)
         self.pauses: Rows = queries.of_round(connection, PAUSES, row.id)
         self.people = queries.participants(connection, row)
@@ -63,8 +73,13 @@ class RoundExport:
         return None if replay.problems else replay
 
     def write(self, files: Mapping[str, TableFile]) -> None:
-        """Add this round's rows to the files, named by their sheets."""
+        """Add this round's rows to the files, named by their sheets.
+
+        Of a round for two people everything but the row of each of them is told by the lower seat.
+        """
         files[ROUNDS_SHEET.name].write(self._round())
+        if self.human.seat != self.row.human.seat:
+            return
         self._write_ticks(files[TICKS_SHEET.name])
         self._write_events(files[EVENTS_SHEET.name])
         for key in self.keys:
@@ -99,7 +114,7 @@ class RoundExport:
             "stand_in_tick": other and other.tick,
             "human_seat": self.human.seat,
             "human_hat": self.human.hat or self.step.human_hat,
-            "partner_hat": self.partner.hat,
+            "partner_hat": self.partner.hat if self.dyad is None else self.step.partner_hat,
             "seed": row.seed,
             "horizon_ticks": row.horizon_ticks,
             "episodes": row.episodes,
@@ -123,6 +138,8 @@ class RoundExport:
             "rtt_median_ms": _quantile(rtts, 0.5),
             "replays": self.replay is not None,
             **self._measures(),
+            "dyad": self.dyad,
+            **earnings(self.step, row),
         }
 
     def _measures(self) -> dict[str, Any]:
@@ -163,6 +180,34 @@ class RoundExport:
             columns = ("tick", "seat", "kind", "thing", "place", "x", "y", "reward")
             values = {name: getattr(event, name) for name in columns}
             file.write({**self.at, **values, "by": by[event.seat]})
+
+
+def dyad_of(connection: Connection, row: RoundRow) -> str | None:
+    """The two people of a round by the numbers of their visits, as `3+7`; None if an agent sits there.
+
+    The hats that they wear are of their own plans: each sees the other as their own plan says.
+    """
+    if any(seat.agent is not None for seat in row.seats):
+        return None
+    there = VISITS.c.id.in_([seat.visit_id for seat in row.seats if seat.visit_id is not None])
+    numbers = connection.execute(select(VISITS.c.visit_no).where(there).order_by(VISITS.c.visit_no)).scalars()
+    return "+".join([*map(str, numbers), "erased"][:2])
+
+
+def earnings(step: RoundStep, row: RoundRow) -> dict[str, Any]:
+    """What a round earned: its bonus if the goal was reached, else 0; None where there was no bonus."""
+    if step.bonus is None or step.goal is None:
+        return {"bonus": None, "bonus_unit": None}
+    reached = row.score is not None and row.score >= step.goal.score
+    return {"bonus": step.bonus.amount if reached else 0.0, "bonus_unit": step.bonus.unit}
+
+
+def earned(rounds: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
+    """What the rounds of a visit earned together, of each as `earnings` tells it."""
+    found = [one for one in rounds if one["bonus"] is not None]
+    if not found:
+        return {"bonus": None, "bonus_unit": None}
+    return {"bonus": round(sum(one["bonus"] for one in found), 6), "bonus_unit": found[-1]["bonus_unit"]}
 
 
 def _action(code: int) -> str:

@@ -30,7 +30,7 @@ from galley.records.export.csv_file import CsvFile
 from galley.records.export.data_dictionary import dictionary_csv, dictionary_markdown
 from galley.records.export.jsonl_file import JsonLinesFile
 from galley.records.export.parquet_file import ParquetFile
-from galley.records.export.round_export import RoundExport
+from galley.records.export.round_export import RoundExport, dyad_of, earned, earnings
 from galley.records.export.sheet_file import PartFile
 from galley.records.export.wide_sheet import Wide
 from galley.records.reading.flags import Flag, flags
@@ -114,6 +114,8 @@ class _Visit:
         self.wide = wide
         self.flags = flagged
         self.rounds: dict[str, RoundRow] = {}
+        self.told: dict[str, dict[str, Any]] = {}
+        """The two people of each round and what it earned, by its step."""
         self.connection = connection
         self.visit = visit
         self.files = files
@@ -133,8 +135,7 @@ class _Visit:
             self.rounds[step.id] = row
             if not step.tutorial:
                 statuses.append(row.status)
-            if row.human.visit_id == self.visit.id:  # a round for two is written with the other one
-                self._round(row, step)
+            self._round(row, step)
         self._participant(statuses)
         self._stages()
         means = self._responses()
@@ -146,7 +147,7 @@ class _Visit:
     def _wide(self, means: Mapping[str, Mapping[str, float | None]]) -> dict[str, Any]:
         answers = queries.answers(self.connection, self.visit.id)
         told = {step: {item: _joined(value) for item, value in of.items()} for step, of in answers.items()}
-        return self.wide.row(self.visit, told, self.rounds, means)
+        return self.wide.row(self.visit, told, self.rounds, self.told, means)
 
     def _small_sheets(self) -> None:
         for sheet, table in ((ATTEMPTS_SHEET, ATTEMPTS), (ABSENCES_SHEET, ABSENCES), (NOTES_SHEET, NOTES)):
@@ -178,7 +179,9 @@ class _Visit:
 
     def _round(self, row: RoundRow, step: RoundStep) -> None:
         at = {**self.who, "step_index": self.places[step.id], "step": step.id}
-        RoundExport(self.connection, row, step, at).write(self.files)
+        dyad = dyad_of(self.connection, row)
+        self.told[step.id] = {"dyad": dyad, **earnings(step, row)}
+        RoundExport(self.connection, row, self.visit.id, step, at, dyad).write(self.files)
 
     def _participant(self, statuses: list[RoundStatus]) -> None:
         visit = self.visit
@@ -207,6 +210,7 @@ class _Visit:
                 "duration_s": _seconds(visit.created_ms, visit.ended_ms),
                 "rounds_finished": statuses.count("finished"),
                 "rounds_abandoned": statuses.count("abandoned"),
+                **earned(self.told.values()),
             }
         )
 
@@ -266,10 +270,12 @@ class _Visit:
         """The round that a questionnaire follows; a comparison and a survey are about no single round."""
         names = ("round_no", "layout", "agent", "partner_hat")
         if not isinstance(step, QuestionnaireStep) or step.round_no is None:
-            return dict.fromkeys(names)
+            return dict.fromkeys((*names, "dyad"))
         before = self.plan.steps[: self.places[step.id]]
         played = next(s for s in reversed(before) if isinstance(s, RoundStep))
-        about = {name: getattr(played, name) for name in names}
+        about = {name: getattr(played, name) for name in names} | {
+            "dyad": self.told.get(played.id, {}).get("dyad")
+        }
         row = self.rounds.get(played.id)
         if row is not None:  # the lobby may have found another partner than was planned
             about["agent"] = next(s.agent for s in row.seats if s.visit_id != self.visit.id)

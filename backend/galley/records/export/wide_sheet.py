@@ -42,15 +42,19 @@ class Wide:
         visit: VisitRow,
         answers: Mapping[str, Mapping[str, Any]],
         rounds: Mapping[str, RoundRow],
+        told: Mapping[str, Mapping[str, Any]],
         means: Mapping[str, Mapping[str, float | None]],
     ) -> dict[str, Any]:
-        """A visit's values in these columns; `rounds` by step, `means` by step and subscale."""
+        """A visit's values in these columns.
+
+        `rounds`, and what else is `told` of them, come by step, `means` by step and subscale.
+        """
         values: dict[str, Any] = {f"condition.{name}": visit.condition.get(name) for name in self._factors}
         for step, item in self._steps:
             if item:
                 values[f"{step}.{item}"] = answers.get(step, {}).get(item)
             else:
-                found = _of(visit, rounds[step]) if step in rounds else {}
+                found = _of(visit, rounds[step]) | dict(told[step]) if step in rounds else {}
                 values |= {f"{step}.{one.name}": found.get(one.name) for one in ROUND_COLUMNS}
         for step, subscale in self._means:
             values[f"{step}.{question_of(subscale)}"] = means.get(step, {}).get(subscale)
