@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,8 @@ from galley.kitchen.codes import (
 )
 from galley.kitchen.layout import Layout, Place
 from galley.kitchen.pots import amount_in, is_soup, onions_in, recipe_of, ticks_in, ticks_left
+
+_Count = TypeVar("_Count", int, NDArray[np.int32])
 
 
 @dataclass(frozen=True)
@@ -79,9 +82,14 @@ def pot_view(layout: Layout, pot: int) -> PotView:
     return PotView(onions, amount_in(pot) - onions, ticks_in(pot), ready)
 
 
+def points(layout: Layout, deliveries: _Count) -> _Count:
+    """What so many paid deliveries (a whole number, or an array of them) amount to."""
+    return deliveries * layout.rules.delivery_reward
+
+
 def score_of(layout: Layout, states: NDArray[np.int16]) -> NDArray[np.int32]:
     """int32[...]: the points made since the start in each state of int16[..., S]."""
-    return states[..., DELIVERIES].astype(np.int32) * layout.rules.delivery_reward
+    return points(layout, states[..., DELIVERIES].astype(np.int32))
 
 
 def view(layout: Layout, state: NDArray[np.int16]) -> KitchenView:
@@ -99,7 +107,7 @@ def view(layout: Layout, state: NDArray[np.int16]) -> KitchenView:
         tick=row[TICK],
         orders_delivered=row[ORDERS_DELIVERED],
         deliveries=row[DELIVERIES],
-        score=int(score_of(layout, state)),
+        score=points(layout, row[DELIVERIES]),
     )
 
 

@@ -14,24 +14,26 @@ from galley.kitchen.codes import (
     CELL,
     CELLS,
     CHEF,
+    DELIVERIES,
     FACING,
     HELD,
     ORDERS_DELIVERED,
 )
-from galley.kitchen.state import pot_view, score_of
+from galley.kitchen.state import points, pot_view
 from galley.protocol.messages import KitchenChanges, WholeKitchen
 
 State = NDArray[int16]
 
 
 class Scene:
-    """One layout's kitchens as seen by the browser; holds nothing that changes."""
+    """One layout's kitchens as seen by the browser; holds nothing that changes but what it has worked out."""
 
     def __init__(self, layout: Layout) -> None:
         self.layout = layout
         self.grid = [row.replace("1", " ").replace("2", " ") for row in layout.grid]
         self._pots = {layout.cell(place) for place in layout.pots}
         self._counters = [layout.cell(place) for place in layout.counters]
+        self._contents: dict[int, tuple[int, int, int, bool]] = {}
         self._places = [layout.place(cell) for cell in range(layout.tiles.size)]
 
     def chefs(self, state: State) -> list[list[int]]:
@@ -50,7 +52,7 @@ class Scene:
             "chefs": self._chefs(row),
             "things": [self._thing(cell, cells[cell]) for cell in self._counters if cells[cell]],
             "pots": [self._pot(cell, cells[cell]) for cell in sorted(self._pots)],
-            "score": score_before + int(score_of(self.layout, state)),
+            "score": score_before + points(self.layout, row[DELIVERIES]),
             "orders": None if orders is None else list(orders[row[ORDERS_DELIVERED] :]),
         }
 
@@ -66,7 +68,7 @@ class Scene:
                 pots.append(self._pot(cell, cells[cell]))
             elif changed:
                 things.append(self._thing(cell, cells[cell]))
-        score = score_before + int(score_of(self.layout, after))
+        score = score_before + points(self.layout, new[DELIVERIES])
         return {"chefs": self._chefs(new), "things": things, "pots": pots, "score": score}
 
     def _chefs(self, row: list[int]) -> list[list[int]]:
@@ -76,8 +78,11 @@ class Scene:
         return [*self._places[cell], thing]
 
     def _pot(self, cell: int, packed: int) -> list[int | bool]:
-        pot = pot_view(self.layout, packed)
-        return [*self._places[cell], pot.onions, pot.tomatoes, pot.ticks, pot.ready]
+        contents = self._contents.get(packed)
+        if contents is None:  # a pot has some seventy contents, told at every tick that it cooks
+            pot = pot_view(self.layout, packed)
+            contents = self._contents[packed] = (pot.onions, pot.tomatoes, pot.ticks, pot.ready)
+        return [*self._places[cell], *contents]
 
 
 def event_rows(events: Iterable[Event]) -> list[list[Any]]:
