@@ -145,7 +145,7 @@ class Round {
     const { say } = this;
     const reload = () => location.reload();
     if (link === "blocked" && why) {
-      const text = `${say(why.missing === "host" ? "blocked_host" : "blocked_websocket")} (Origin ${why.origin}, Host ${why.host})`;
+      const text = `${why.missing === "host" ? say("blocked_host") : say("blocked_websocket")} (Origin ${why.origin}, Host ${why.host})`;
       this.hud.show({ kind: "lost", title: say("blocked"), text });
       this.blocked = true;
     }

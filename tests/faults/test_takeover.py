@@ -20,6 +20,7 @@ from galley.records import RoundRow, Store
 from galley.records.reading.verify import verify_study
 from galley.workspace import Workspace
 from tests.postgres import Postgres, running
+from tests.records.stored import stored_answers, stored_visit
 from tests.server.helpers import Player, Served, serving
 from tests.serving import Server
 from tests.serving import served as serve
@@ -133,10 +134,10 @@ def until_it_goes(attempt: Callable[[], Any], seconds: float = 60.0) -> Any:
 def checked(database: str, path: str) -> RoundRow:
     """The visit's round as stored: whole, replaying bit for bit, every answer there."""
     with Store.open(database) as store:
-        visit = store.visit(path.rsplit("/", 1)[1]).result()
+        visit = stored_visit(store, path.rsplit("/", 1)[1])
         assert visit is not None
         assert (visit.status, visit.completion_code) == ("completed", "ONE-1")
-        assert store.answers(visit.id).result() == {"open": {"why": "soup"}}
+        assert stored_answers(store, visit.id) == {"open": {"why": "soup"}}
         row = store.open_round(visit.id, "rounds-1").result()
         assert row is not None
         assert (row.status, len(row.joint_actions)) == ("finished", TICKS)
@@ -148,7 +149,7 @@ def checked(database: str, path: str) -> RoundRow:
 def whole(database: str, study: str, path: str) -> None:
     """The visit's round has every tick and replays bit for bit."""
     with Store.open(database) as store:
-        visit = store.visit(path.rsplit("/", 1)[1]).result()
+        visit = stored_visit(store, path.rsplit("/", 1)[1])
         assert visit is not None
         row = store.open_round(visit.id, "rounds-1").result()
         assert row is not None
@@ -243,7 +244,7 @@ def test_two_people_who_came_to_different_servers_are_paired_and_play(
     debrief(pair[0], paths[1])
     whole(postgres.url("two"), "both", paths[0])
     with Store.open(postgres.url("two")) as store:
-        rows = [store.visit(path.rsplit("/", 1)[1]).result() for path in paths]
+        rows = [stored_visit(store, path.rsplit("/", 1)[1]) for path in paths]
         rounds = [store.open_round(row.id, "rounds-1").result() for row in rows if row is not None]
         assert rounds[0] is not None
         assert rounds[1] is not None
@@ -287,7 +288,7 @@ def test_people_who_come_to_two_servers_at_once_are_each_paired_once(
     with ThreadPoolExecutor(8) as people:
         paths = list(people.map(come, range(8)))
     with Store.open(postgres.url("two")) as store:
-        visits = [store.visit(path.rsplit("/", 1)[1]).result() for path in paths]
+        visits = [stored_visit(store, path.rsplit("/", 1)[1]) for path in paths]
         rounds = [store.open_round(visit.id, "rounds-1").result() for visit in visits if visit is not None]
         ids = [row.id for row in rounds if row is not None]
     assert len(ids) == 8

@@ -9,7 +9,18 @@ from typing import Any
 import numpy as np
 
 from galley.kitchen import Kitchen, Layout
-from galley.records import ClockRow, KeyRow, PauseRow, Store, TickRow, VisitRow
+from galley.records import (
+    Arrival,
+    ClockRow,
+    KeyRow,
+    NewRound,
+    PauseRow,
+    Planned,
+    SeatRow,
+    Store,
+    TickRow,
+    VisitRow,
+)
 from galley.records.reading.round_replay import state_bytes
 from galley.study.stages.round_step import RoundStep
 from galley.study.stages.stage_kinds import ComparisonStep, ConsentStep, DebriefStep, Side
@@ -67,31 +78,23 @@ def plan(visit_no: int = 0) -> Plan:
 
 def begin(store: Store, study: str = "demo", **link_params: str) -> VisitRow:
     """A new visit."""
-    visit_no = store.next_visit_no(study).result()
-    text = plan(visit_no).to_json()
-    return store.create_visit(
-        study, "d" * 64, 2**64 - 1, visit_no, text, {"arm": "a"}, link_params, START_MS
-    ).result()
+    arrival = Arrival(study, "d" * 64, START_MS, link_params)
+    begun = store.begin_visit(arrival, lambda no, _: Planned(2**64 - 1, plan(no).to_json(), {"arm": "a"}))
+    visit = begun.result().visit
+    assert visit is not None
+    return visit
 
 
 def open_round(store: Store, visit: VisitRow, step_id: str = "rounds-1", layout: Layout = TINY) -> int:
     """The id of the visit's round at a step of `plan`."""
     step = next(step for step in plan().steps if isinstance(step, RoundStep) and step.id == step_id)
-    return store.create_round(
-        visit.id,
-        step_id,
-        step.round_no,
-        json.dumps(layout.to_dict()),
-        step.layout,
-        layout.rules.horizon_ticks,
-        step.tick_ms,
-        step.human_seat,
-        step.agent,
-        "a" * 64,
-        step.partner_hat,
-        step.seed,
-        START_MS,
-    ).result()
+    seats = (
+        SeatRow(step.human_seat, visit.id, step_id),
+        SeatRow(1 - step.human_seat, None, None, step.agent, "a" * 64, step.partner_hat),
+    )
+    drawn, ticks = json.dumps(layout.to_dict()), layout.rules.horizon_ticks
+    new = NewRound(step.round_no, step.layout, drawn, ticks, step.tick_ms, step.seed, START_MS, seats)
+    return store.set_up_round(new).result()
 
 
 def joint_actions(seed: int, ticks: int) -> list[tuple[int, int]]:

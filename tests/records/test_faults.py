@@ -15,6 +15,7 @@ from galley.errors import GalleyError
 from galley.records import Store, TickRow
 from galley.records.database import engine
 from tests.records.helpers import START_MS, begin, joint_actions, one_soup, open_round, play, tick_rows
+from tests.records.stored import stored_trajectory, stored_visit
 
 
 @pytest.fixture
@@ -89,7 +90,7 @@ def test_a_round_that_cannot_be_finished_keeps_its_journal(impatient: Store, fil
             impatient.finish_round(round_id, "abandoned", 0, 0, START_MS, b"").result()
         assert impatient.health().waiting_rows == 10
     assert impatient.finish_round(round_id, "abandoned", 0, 0, START_MS, b"").result() is True
-    assert len(impatient.trajectory(round_id).joint_actions) == 10
+    assert len(stored_trajectory(impatient, round_id).joint_actions) == 10
 
 
 def test_a_row_the_database_refuses_is_told_and_harms_no_other_round(impatient: Store) -> None:
@@ -104,7 +105,7 @@ def test_a_row_the_database_refuses_is_told_and_harms_no_other_round(impatient: 
     assert not health.ok
     assert (health.waiting_rows, health.lost_rows) == (0, 3)
     assert "3 journal rows were refused" in health.message
-    assert len(impatient.trajectory(good).joint_actions) == 3
+    assert len(stored_trajectory(impatient, good).joint_actions) == 3
     play(impatient, bad, one_soup())
     assert not impatient.health().ok, "what was lost stays told"
 
@@ -125,7 +126,7 @@ def test_a_job_that_raises_leaves_nothing_behind(impatient: Store) -> None:
     bad = impatient.save_answers(visit.id, "survey", {"ease": {1, 2}}, 1, "active", START_MS)
     with pytest.raises(Exception, match="not JSON serializable"):
         bad.result()
-    after = impatient.visit(visit.token).result()
+    after = stored_visit(impatient, visit.token)
     assert after is not None
     assert after.step_index == 0
     assert impatient.save_answers(visit.id, "survey", {"ease": 1}, 1, "active", START_MS).result() is True

@@ -6,6 +6,7 @@ import html
 
 import pytest
 
+from tests.records.stored import stored_visit
 from tests.security.conftest import Site
 from tests.security.harmless import dangers
 from tests.security.hostile import ALL, MARK, SCRIPTS
@@ -46,7 +47,7 @@ def test_answers_run_nowhere(site: Site, script: str) -> None:
     one.submit({**fields, "often": "1", "kind": "b", "words": script[:80]})
     assert one.stage == "instructions"
     client = site.researcher()
-    row = site.served.store.visit(one.token).result()
+    row = stored_visit(site.served.store, one.token)
     assert row is not None
     page = client.get(f"/researcher/visits/{row.id}")
     assert page.status_code == 200
@@ -70,7 +71,7 @@ def test_links_run_nowhere(site: Site, script: str) -> None:
         assert answer.status_code < 500
         check(answer.text, shown=False)
     token = begun.url.path.rsplit("/", 1)[1]
-    row = site.served.store.visit(token).result()
+    row = stored_visit(site.served.store, token)
     assert row is not None
     check(site.researcher().get(f"/researcher/visits/{row.id}").text, shown=False)
 

@@ -11,6 +11,7 @@ from websockets.sync.client import connect
 
 from galley.records import Store
 from galley.server.headers import HEADERS
+from tests.records.stored import stored_visit
 from tests.security.conftest import Site
 from tests.security.walk import OPEN, RESEARCHER, TOKEN, class_of
 from tests.server.helpers import Participant
@@ -121,7 +122,7 @@ def test_nobody_moves_somebody_elses_visit(site: Site) -> None:
 
 
 def _standing(store: Store, one: Participant) -> tuple[int, str]:
-    row = store.visit(one.token).result()
+    row = stored_visit(store, one.token)
     assert row is not None
     return row.step_index, row.status
 

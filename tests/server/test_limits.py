@@ -19,6 +19,7 @@ from galley.server.researcher import login_throttle
 from galley.server.researcher.login_throttle import Throttle
 from galley.server.rounds.play_socket import MOST_SOCKETS, SOCKETS_AT_ONCE
 from galley.study.visit.condition_slots import UNANSWERED_MS, Issue, Slot, allocate
+from tests.records.stored import stored_visit
 from tests.server.helpers import ONE_ROUND, Participant, Served, serving
 from tests.study.workspaces import study_workspace
 
@@ -83,7 +84,7 @@ def test_a16_the_store_knows_who_answered(served: Served) -> None:
         return [slot.answered for slot in found if slot.visit_id == visit.id]
 
     person = Participant(served)
-    visit = served.store.visit(person.token).result()
+    visit = stored_visit(served.store, person.token)
     assert visit is not None
     assert answered() == [False]
     person.agree()

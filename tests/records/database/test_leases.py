@@ -12,6 +12,7 @@ from galley.records import ClockRow, KeyRow, Lease, LeaseLost, Store
 from tests.postgres import Postgres
 from tests.records import databases
 from tests.records.helpers import START_MS, begin, joint_actions, one_soup, open_round, tick_rows
+from tests.records.stored import stored_trajectory, stored_visit
 
 LONG_S = 600.0
 
@@ -59,7 +60,7 @@ def test_a_round_is_played_and_finished_under_a_lease(store: Store) -> None:
     lease = taken(store, round_id, "a")
     store.journal(round_id, tick_rows(joint_actions(1, 7)), lease=lease)
     assert store.finish_round(round_id, "abandoned", 0, 0, START_MS, b"", lease=lease).result() is True
-    assert len(store.trajectory(round_id).joint_actions) == 7
+    assert len(stored_trajectory(store, round_id).joint_actions) == 7
     assert taken(store, round_id, "b").number == 2, "finishing lets go"
     assert store.health().fenced_rows == 0
 
@@ -96,9 +97,9 @@ def test_what_the_last_owner_still_writes_is_dropped(pair: tuple[Store, Store]) 
     assert (health.ok, health.fenced_rows, health.lost_rows) == (True, 3, 0)
     two.journal(round_id, tick_rows(one_soup()[5:], 5), lease=new)
     two.flush().result()
-    stored = two.trajectory(round_id).joint_actions.tolist()
+    stored = stored_trajectory(two, round_id).joint_actions.tolist()
     assert stored == [list(pair) for pair in [*joint_actions(1, 5), *one_soup()[5:]]]
-    assert len(two.trajectory(other).joint_actions) == 4
+    assert len(stored_trajectory(two, other).joint_actions) == 4
     with pytest.raises(LeaseLost, match="taken over"):
         one.finish_round(round_id, "finished", 0, 0, START_MS, b"", lease=old).result()
     with pytest.raises(LeaseLost):
@@ -132,7 +133,7 @@ def test_a_take_over_waits_for_a_write_that_is_under_way(pair: tuple[Store, Stor
     seen = two.open_round(visit.id, "rounds-1").result()
     assert seen is not None
     one.flush().result()
-    assert len(two.trajectory(round_id).joint_actions) == len(seen.joint_actions)
+    assert len(stored_trajectory(two, round_id).joint_actions) == len(seen.joint_actions)
 
 
 def test_keys_and_pings_are_signs_of_life_of_their_seat(store: Store) -> None:
@@ -142,6 +143,6 @@ def test_keys_and_pings_are_signs_of_life_of_their_seat(store: Store) -> None:
         store.journal(round_id, keys=[KeyRow(1, "up", True, 1.0, START_MS + at, 0, 1)])
         store.journal(round_id, clocks=[ClockRow(1.0, START_MS + at + 900, 20.0, 0)])
         store.flush().result()
-    after = store.visit(visit.token).result()
+    after = stored_visit(store, visit.token)
     assert after is not None
     assert after.last_seen_ms == START_MS + 30_000

@@ -32,6 +32,7 @@ from tests.postgres import Postgres
 from tests.records import databases
 from tests.records.databases import Database
 from tests.records.helpers import begin, one_soup, open_round, plan, play
+from tests.records.stored import stored_visit
 from tests.study.written.test_questionnaire import made
 
 # As the first revision wrote it; never to be changed. Made by `sqlite3 galley.sqlite .dump`.
@@ -165,7 +166,7 @@ def test_a_database_of_the_first_revision_is_brought_forward_with_its_data(
         assert content(old, "ticks", "keys", "pauses", "clocks", "stages") == ticks
         visit = begin(store)
         assert (visit.visit_no, visit.id > most) == (2, True)
-        assert store.visit(visit.token).result() == visit
+        assert stored_visit(store, visit.token) == visit
     assert "'=1+1" in (tmp_path / "out" / "responses.csv").read_text(encoding="utf-8")
     counted = old.rows("SELECT status, played_ticks, late_ticks, fault_ticks FROM rounds ORDER BY id")
     assert counted == [("finished", 40, 0, 0), ("open", None, None, None)]

@@ -10,9 +10,11 @@ import pytest
 from galley.errors import GalleyError
 from galley.records import Store
 from galley.records.database import writer as writer_module
+from galley.records.store import queries
 from tests import postgres
 from tests.records import databases
 from tests.records.helpers import START_MS, begin, joint_actions, open_round, tick_rows
+from tests.records.stored import stored_trajectory, stored_visit
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +51,7 @@ def test_rounds_go_on_while_the_database_restarts(server: postgres.Postgres, url
             store.journal(round_id, tick_rows(actions[10:30], 10), lease=lease)
             wait_until(lambda: not store.health().ok)
             answered = store.save_answers(visit.id, "survey", {"ease": 5}, 1, "active", START_MS)
-            found = store.visit(visit.token)
+            found = store.read(lambda connection: queries.visit(connection, visit.token))
             health = store.health()
             assert (health.waiting_rows, health.lost_rows) == (20, 0)
             assert health.message
@@ -62,7 +64,7 @@ def test_rounds_go_on_while_the_database_restarts(server: postgres.Postgres, url
         assert store.finish_round(round_id, "abandoned", 0, 0, START_MS, b"", lease=lease).result() is True
         assert store.health().ok
         assert not lease.lost
-        assert store.trajectory(round_id).joint_actions.tolist() == [list(pair) for pair in actions]
+        assert stored_trajectory(store, round_id).joint_actions.tolist() == [list(pair) for pair in actions]
 
 
 def test_who_waits_too_long_is_told_so_and_the_journal_is_kept(server: postgres.Postgres, url: str) -> None:
@@ -77,7 +79,7 @@ def test_who_waits_too_long_is_told_so_and_the_journal_is_kept(server: postgres.
                 failed.result()
             assert "\n" not in str(caught.value)
             with pytest.raises(GalleyError, match="cannot be reached"):
-                store.visit(visit.token).result()
+                stored_visit(store, visit.token)
             with pytest.raises(GalleyError, match="cannot be written"):
                 store.finish_round(round_id, "abandoned", 0, 0, START_MS, b"").result()
             assert store.health().waiting_rows == 5
@@ -88,7 +90,7 @@ def test_who_waits_too_long_is_told_so_and_the_journal_is_kept(server: postgres.
             server.start()
         wait_until(lambda: store.health().ok)
         assert store.health().waiting_rows == 0
-        assert len(store.trajectory(round_id).joint_actions) == 5
+        assert len(stored_trajectory(store, round_id).joint_actions) == 5
 
 
 def test_what_waits_is_bounded_and_what_is_dropped_is_told(
@@ -104,7 +106,7 @@ def test_what_waits_is_bounded_and_what_is_dropped_is_told(
         assert (health.ok, health.waiting_rows, health.lost_rows) == (False, 12, 8)
         assert "more than 12 were waiting" in health.message
     with Store.open(url) as store:
-        assert len(store.trajectory(round_id).joint_actions) == 12
+        assert len(stored_trajectory(store, round_id).joint_actions) == 12
 
 
 def test_closing_does_not_wait_for_a_database_that_is_away(server: postgres.Postgres, url: str) -> None:

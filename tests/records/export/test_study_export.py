@@ -17,6 +17,7 @@ from galley.records.export.columns import SHEETS, WIDE
 from galley.records.export.study_export import export_study
 from galley.study.written.questionnaire import Questionnaire
 from tests.records.helpers import START_MS, begin, joint_actions, one_soup, open_round, play, tick_rows
+from tests.records.stored import stored_trajectory
 
 SCALE = {"scale": 7, "low_label": "low", "high_label": "high"}
 AFTER = (
@@ -360,9 +361,9 @@ def test_memory_does_not_grow_with_the_study(store: Store, tmp_path: Path) -> No
 def test_the_trajectory_of_a_stored_round_replays(store: Store) -> None:
     round_id = open_round(store, begin(store))
     kitchen = play(store, round_id, one_soup())
-    trajectory = store.trajectory(round_id)
+    trajectory = stored_trajectory(store, round_id)
     assert replay(trajectory)[-1].tolist() == kitchen.state.tolist()
     assert (trajectory.seats[0].name, trajectory.seats[1].kind) == ("chef-a", "human")
     assert trajectory.seed == 2**63 + 5
     with pytest.raises(GalleyError, match="no round 77"):
-        store.trajectory(77)
+        stored_trajectory(store, 77)

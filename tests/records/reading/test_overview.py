@@ -10,6 +10,7 @@ from galley.records.reading import overview
 from galley.study.written.questionnaire import Questionnaire
 from tests.records.helpers import START_MS, begin, joint_actions, one_soup, open_round, play, tick_rows
 from tests.records.store.test_slots import arrive, begun, leave
+from tests.records.stored import stored_answers, stored_visit
 
 CHECK = {
     "id": "check",
@@ -177,7 +178,7 @@ def test_the_timeline_tells_what_happened_in_order(store: Store) -> None:
         ("ended", 6000),
     ]
     assert "attempt 1 failed: check" in [entry.words for entry in found]
-    after = store.visit(visit.token).result()
+    after = stored_visit(store, visit.token)
     assert after is not None
     assert (after.status, after.completion_code, after.tries) == ("timed_out", "SORRY", 1)
     assert after.consent_sha256 == "c" * 64
@@ -187,7 +188,7 @@ def test_answers_come_back_by_step_and_for_the_page(store: Store) -> None:
     visit = begin(store)
     store.save_answers(visit.id, "survey", {"b": 1, "a": ["x"]}, 1, "active", START_MS).result()
     asked(store, visit, 3)
-    found = store.answers(visit.id).result()
+    found = stored_answers(store, visit.id)
     assert found == {"survey": {"b": 1, "a": ["x"]}, "rounds-1-questions": {"check": 3}}
     rows = store.read(lambda c: overview.answers(c, visit.id)).result()
     assert [(row.item, row.text, row.value, row.passed) for row in rows] == [

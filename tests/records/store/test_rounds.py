@@ -13,6 +13,7 @@ from galley.records import NewRound, SeatRow, Store, VisitRow
 from galley.records.reading.round_replay import state_bytes
 from galley.records.reading.verify import verify_study
 from tests.records.helpers import START_MS, TINY, begin, joint_actions, one_soup, tick_rows
+from tests.records.stored import stored_episodes
 
 
 def shared(first: VisitRow, second: VisitRow, episodes: int = 1) -> NewRound:
@@ -72,7 +73,7 @@ def test_a_round_of_episodes_starts_afresh_each_time_and_replays(store: Store) -
     report = verify_study(store, "demo")
     assert report.ok, str(report)
     assert report.ticks == 120
-    found = store.trajectories(round_id)
+    found = stored_episodes(store, round_id)
     assert [one.joint_actions.tolist() for one in found] == [[list(p) for p in one] for one in episodes]
     row = store.open_round(ada.id, "rounds-1").result()
     assert row is not None

@@ -16,6 +16,7 @@ from galley.study.visit.condition_slots import Full, Issue, allocate
 from tests.postgres import Postgres
 from tests.records import databases
 from tests.records.helpers import START_MS, plan
+from tests.records.stored import stored_visit
 
 CELLS = ("a", "b", "c")
 EXPIRES_MS = 60_000.0
@@ -57,7 +58,7 @@ def test_each_arrival_has_the_next_slot(store: Store) -> None:
     assert [visit.slot for visit in visits] == [0, 1, 2, 3]
     assert [visit.visit_no for visit in visits] == [0, 1, 2, 3]
     assert [visit.condition["arm"] for visit in visits] == ["a", "b", "c", "a"]
-    assert visits[2] == store.visit(visits[2].token).result()
+    assert visits[2] == stored_visit(store, visits[2].token)
     assert (visits[0].language, visits[0].last_seen_ms, visits[0].test) == ("zh", START_MS, False)
 
 
@@ -68,7 +69,7 @@ def test_the_slot_of_somebody_who_left_is_given_out_again(store: Store, status: 
     third = begun(arrive(store))
     assert (third.slot, third.condition, third.visit_no) == (0, first.condition, 2)
     assert begun(arrive(store)).slot == 2
-    after = store.visit(first.token).result()
+    after = stored_visit(store, first.token)
     assert after is not None
     assert after.status == status
     assert leave(store, second, "completed")
@@ -77,12 +78,12 @@ def test_the_slot_of_somebody_who_left_is_given_out_again(store: Store, status: 
 def test_a_silent_visit_loses_its_slot_to_the_next_arrival_only(store: Store) -> None:
     first = begun(arrive(store))
     late = START_MS + EXPIRES_MS + 1
-    still = store.visit(first.token).result()
+    still = stored_visit(store, first.token)
     assert still is not None
     assert still.status == "active"
     second = begun(arrive(store, late))
     assert second.slot == 0
-    gone = store.visit(first.token).result()
+    gone = stored_visit(store, first.token)
     assert gone is not None
     assert (gone.status, gone.ended_ms) == ("expired", late)
     assert leave(store, first, "completed", late) is False
@@ -94,7 +95,7 @@ def test_a_silent_visit_loses_its_slot_to_the_next_arrival_only(store: Store) ->
 
 def test_signs_of_life_keep_a_slot(store: Store) -> None:
     first, second = begun(arrive(store)), begun(arrive(store))
-    store.seen(first.id, START_MS + 50_000).result()
+    store.back_on_page(first.id, START_MS + 50_000).result()
     store.enter_step(second.id, "consent", START_MS + 50_000).result()
     assert begun(arrive(store, START_MS + EXPIRES_MS + 1)).slot == 2
 

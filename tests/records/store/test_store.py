@@ -17,15 +17,17 @@ from sqlalchemy.exc import DBAPIError
 
 from galley.errors import GalleyError
 from galley.records import ClockRow, KeyRow, PauseRow, Store
+from galley.records.store import queries
 from galley.study.written.questionnaire import Questionnaire
 from tests.records.databases import Database
 from tests.records.helpers import START_MS, begin, joint_actions, one_soup, open_round, play, tick_rows
+from tests.records.stored import stored_visit
 
 
 def test_a_visit_is_found_by_its_token_alone(store: Store) -> None:
     visit = begin(store, PROLIFIC_PID="abc")
     other = begin(store)
-    assert store.visit(visit.token).result() == visit
+    assert stored_visit(store, visit.token) == visit
     assert visit.seed == 2**64 - 1
     assert visit.condition == {"arm": "a"}
     assert visit.link_params == {"PROLIFIC_PID": "abc"}
@@ -34,17 +36,17 @@ def test_a_visit_is_found_by_its_token_alone(store: Store) -> None:
     assert visit.participant != other.participant
     assert len(visit.token) >= 32
     assert visit.participant not in visit.token
-    assert store.visit("no such token").result() is None
+    assert stored_visit(store, "no such token") is None
 
 
 def test_visit_numbers_are_never_given_out_twice(store: Store, database: Database) -> None:
     with ThreadPoolExecutor(8) as pool:
-        numbers = list(pool.map(lambda _: store.next_visit_no("demo").result(), range(40)))
+        numbers = list(pool.map(lambda _: begin(store).visit_no, range(40)))
     assert sorted(numbers) == list(range(40))
-    assert store.next_visit_no("other").result() == 0
+    assert begin(store, "other").visit_no == 0
     store.close()
     with Store.open(database.url) as again:
-        assert again.next_visit_no("demo").result() == 40
+        assert begin(again).visit_no == 40
 
 
 def test_answers_are_in_the_file_once_acknowledged(store: Store, database: Database) -> None:
@@ -58,7 +60,7 @@ def test_answers_are_in_the_file_once_acknowledged(store: Store, database: Datab
         ("which", '["a", "b"]', 3),
         ("left_out", "null", 4),
     ]
-    after = store.visit(visit.token).result()
+    after = stored_visit(store, visit.token)
     assert after is not None
     assert (after.step_index, after.status, after.ended_ms) == (1, "active", None)
 
@@ -76,7 +78,7 @@ def test_the_same_form_sent_twice_counts_once(store: Store, database: Database) 
 def test_the_last_step_ends_the_visit_with_its_code(store: Store) -> None:
     visit = begin(store)
     store.save_answers(visit.id, "compare", {}, 6, "completed", START_MS + 9, completion_code="DONE").result()
-    after = store.visit(visit.token).result()
+    after = stored_visit(store, visit.token)
     assert after is not None
     assert (after.status, after.completion_code, after.ended_ms) == ("completed", "DONE", START_MS + 9)
 
@@ -222,7 +224,9 @@ def test_futures_can_be_awaited_and_outlive_a_request_that_was_given_up(
             store.save_answers(visit.id, "survey", {"ease": 5}, 1, "active", START_MS)
         )
         waiting.cancel()
-        again = await asyncio.wrap_future(store.visit(visit.token))
+        again = await asyncio.wrap_future(
+            store.read(lambda connection: queries.visit(connection, visit.token))
+        )
         assert again is not None
 
     asyncio.run(leave_at_once())
@@ -261,7 +265,7 @@ def test_closing_writes_what_waits_and_refuses_more(database: Database) -> None:
     with pytest.raises(GalleyError, match="closed"):
         store.journal(round_id, tick_rows(joint_actions(1, 3)))
     with pytest.raises(GalleyError, match="closed"):
-        store.next_visit_no("demo").result()
+        begin(store)
 
 
 def test_what_is_acknowledged_is_synced(store: Store) -> None:

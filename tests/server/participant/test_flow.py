@@ -12,6 +12,7 @@ from sqlalchemy import Connection
 from galley.records import VisitRow
 from galley.records.database.tables import STAGES, VISITS
 from galley.study.study import load_study
+from tests.records.stored import stored_answers, stored_visit
 from tests.server.helpers import Participant, Served, serving
 from tests.study.workspaces import study_workspace
 
@@ -92,7 +93,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
 
 
 def row_of(person: Participant) -> VisitRow:
-    row = person.served.store.visit(person.token).result()
+    row = stored_visit(person.served.store, person.token)
     assert row is not None
     return row
 
@@ -245,7 +246,7 @@ def test_conditions_skips_waits_and_limits(served: Served) -> None:
     assert (late.status_code, person.step) == (200, "strict"), (
         "what is missing when the time is up is left out"
     )
-    answers = served.store.answers(row_of(person).id).result()
+    answers = stored_answers(served.store, row_of(person).id)
     assert set(answers) == {"gate", "quiz"}
     earlier(served, person.token, 30)
     person.submit(OLD)
@@ -262,7 +263,7 @@ def test_time_that_is_up_is_seen_by_the_server_alone(served: Served) -> None:
     earlier(served, person.token, 10)
     person.submit(OLD)
     assert person.step == "strict"
-    assert "quick" not in served.store.answers(row_of(person).id).result(), "it came much too late"
+    assert "quick" not in stored_answers(served.store, row_of(person).id), "it came much too late"
     earlier(served, person.token, 90)
     person.load()
     assert person.stage == "ending"

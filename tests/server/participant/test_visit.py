@@ -14,6 +14,7 @@ from galley.kitchen import Kitchen, Layout
 from galley.records.database.tables import RESPONSES, STAGES
 from galley.records.store import queries
 from galley.study.study import load_study
+from tests.records.stored import stored_visit
 from tests.server.helpers import QUICK, Participant, Served, good_answers, serving
 from tests.study.workspaces import study_workspace
 
@@ -89,7 +90,7 @@ def test_a_whole_visit_from_the_landing_page_to_the_completion_code(served: Serv
     for secret in ("myopic", "random", ".onnx", "agent.yaml"):
         assert secret not in told, f"the browser was told of {secret}"
 
-    row = served.store.visit(person.token).result()
+    row = stored_visit(served.store, person.token)
     assert row is not None
     assert (row.status, row.completion_code, row.link_params) == (
         "completed",
@@ -120,7 +121,7 @@ def test_declining_ends_the_visit(served: Served) -> None:
     page = person.submit({"choice": "decline"})
     assert (page.status_code, person.stage) == (200, "ending")
     assert person.submit({"choice": "agree"}, step="consent").text == page.text
-    row = served.store.visit(person.token).result()
+    row = stored_visit(served.store, person.token)
     assert row is not None
     assert (row.status, row.consent_sha256) == ("declined", None)
 
@@ -147,7 +148,7 @@ def test_answers_out_of_range_are_shown_again_with_nothing_lost(served: Served) 
     assert "<b>salt</b>" not in page.text
     nothing = person.submit()
     assert nothing.status_code == 422
-    row = served.store.visit(person.token).result()
+    row = stored_visit(served.store, person.token)
     assert row is not None
     assert row.step_index == 1
     assert answer(person, "before-game").status_code == 200
@@ -174,11 +175,11 @@ def test_a_practice_that_may_be_skipped_is_skipped_and_a_round_is_not(served: Se
     assert person.step == "tutorial"
     person.submit({"skip": "1"})
     assert person.stage == "round"
-    row = served.store.visit(person.token).result()
+    row = stored_visit(served.store, person.token)
     assert row is not None
     assert row.step_index == 4
     person.submit({"skip": "1"}, step="rounds-1")
-    after = served.store.visit(person.token).result()
+    after = stored_visit(served.store, person.token)
     assert after is not None
     assert after.step_index == 4
 

@@ -67,7 +67,7 @@ def test_what_is_kept_of_a_page_that_keeps_telling_is_bounded(served: Served) ->
         served.store.left_page(visit.id, "consent", visit.created_ms + 2 * number)
         served.store.back_on_page(visit.id, visit.created_ms + 2 * number + 1)
     served.store.flush().result()
-    served.store.seen(visit.id, 0).result()
+    served.store.enter_step(visit.id, "consent", visit.created_ms).result()
     assert len(absences(person)) == MOST_ABSENCES
 
 

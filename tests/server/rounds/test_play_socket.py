@@ -21,6 +21,7 @@ from galley.kitchen import EAST, STAY, Kitchen, Layout
 from galley.records import RoundRow, Store
 from galley.records.database.tables import CLOCKS, KEYS, PAUSES, TICKS
 from galley.records.store import queries
+from tests.records.stored import stored_visit
 from tests.server.helpers import ONE_ROUND, Participant, Player, Served, serving, wait_until
 from tests.serving import served as real_server
 from tests.study.workspaces import study_workspace
@@ -42,7 +43,7 @@ def person(served: Served) -> Participant:
 
 def stored(store: Store, token: str) -> RoundRow:
     """The one round of a visit."""
-    visit = store.visit(token).result()
+    visit = stored_visit(store, token)
     assert visit is not None
     row = store.open_round(visit.id, "rounds-1").result()
     assert row is not None
@@ -387,7 +388,7 @@ def test_a_killed_server_loses_at_most_a_second_and_the_round_goes_on(tmp_path: 
             assert player.until("ended")["outcome"] == "finished"
     assert server.process.returncode == 0, "told to stop, it stops cleanly"
     with Store.open(database) as store:
-        visit = store.visit(someone.token).result()
+        visit = stored_visit(store, someone.token)
         assert visit is not None
         with store.reading() as connection:
             (number,) = queries.rounds_of_visit(connection, visit.id)

@@ -12,6 +12,7 @@ from galley.records.reading.films import footage_of_round
 from galley.records.reading.verify import verify_study
 from galley.records.store import queries
 from galley.server.researcher.replay_document import replay_document
+from tests.records.stored import stored_episodes, stored_trajectory
 from tests.server.helpers import Participant, Served, serving
 from tests.server.participant.test_flow import row_of
 from tests.study.workspaces import study_workspace
@@ -62,7 +63,7 @@ def test_nobody_is_seen_in_the_replay_or_the_film_of_a_round_played_alone(served
     with_agent = served.store.open_round(visit.id, "rounds-1").result()
     assert practice is not None
     assert with_agent is None, "it begins with its first connection"
-    assert [seat.kind for seat in served.store.trajectory(practice.id).seats] == ["human", "nobody"]
+    assert [seat.kind for seat in stored_trajectory(served.store, practice.id).seats] == ["human", "nobody"]
     assert footage_of_round(served.store, practice.id).drawn == (0,)
     board = replay_document(practice, {})["frames"][0]["board"]
     assert (board["seat"], board["partner"]) == (0, "none")
@@ -89,7 +90,7 @@ def test_episodes_are_one_round_in_the_records_and_replay(served: Served) -> Non
         60,
         ended["score"],
     )
-    assert len(served.store.trajectories(row.id)) == 3
+    assert len(stored_episodes(served.store, row.id)) == 3
     report = verify_study(served.store, "mine")
     assert report.ok, str(report)
 

@@ -7,12 +7,10 @@ from concurrent.futures import Future
 
 from sqlalchemy import Connection
 
-from galley.kitchen.trajectory import Trajectory
 from galley.records.database import leases
 from galley.records.database.journal_rows import Journal
 from galley.records.database.leases import Lease
-from galley.records.reading.round_replay import trajectories_of
-from galley.records.rows import ClockRow, KeyRow, NewRound, PauseRow, RoundRow, SeatRow, TickRow
+from galley.records.rows import ClockRow, KeyRow, NewRound, PauseRow, RoundRow, TickRow
 from galley.records.store import pairing, queries, round_writes
 from galley.records.store.pairing import Together, Waits
 from galley.records.store.store_base import StoreBase
@@ -27,30 +25,6 @@ class RoundStore(StoreBase):
         Fails with GalleyError if one of them plays another round at that step.
         """
         return self.write(lambda connection: round_writes.set_up(connection, new))
-
-    def create_round(
-        self,
-        visit_id: int,
-        step_id: str,
-        round_no: int,
-        layout_json: str,
-        layout: str,
-        horizon: int,
-        tick_ms: int,
-        human_seat: int,
-        agent: str,
-        agent_sha256: str,
-        partner_hat: str,
-        seed: int,
-        at_ms: float,
-        human_hat: str | None = None,
-    ) -> Future[int]:
-        """The id of the visit's round with an agent at this step, set up now unless it was before."""
-        human = SeatRow(human_seat, visit_id, step_id, hat=human_hat)
-        partner = SeatRow(1 - human_seat, None, None, agent, agent_sha256, partner_hat)
-        return self.set_up_round(
-            NewRound(round_no, layout, layout_json, horizon, tick_ms, seed, at_ms, (human, partner))
-        )
 
     def open_round(self, visit_id: int, step_id: str) -> Future[RoundRow | None]:
         """The visit's round at this step with everything journalled so far, None if it was never set up.
@@ -159,20 +133,3 @@ class RoundStore(StoreBase):
         if lease is not None:
             self._writer.let_go(lease)
         return self.write(work, first=round_id)
-
-    def trajectory(self, round_id: int) -> Trajectory:
-        """The first episode of a round as far as it is committed, ready to be replayed.
-
-        Raises:
-            GalleyError: there is no such round, or what is stored cannot be played.
-        """
-        return self.trajectories(round_id)[0]
-
-    def trajectories(self, round_id: int) -> tuple[Trajectory, ...]:
-        """All episodes of a round as far as they are committed, at least one.
-
-        Raises:
-            GalleyError: as `trajectory`.
-        """
-        with self.reading() as connection:
-            return trajectories_of(queries.round_row(connection, round_id))

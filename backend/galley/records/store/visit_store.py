@@ -8,7 +8,7 @@ from typing import Any
 
 from galley.outcomes import VISIT_STATUSES, NoRoom
 from galley.records.database.tables import STUDY_STATES, StudyState
-from galley.records.rows import Arrival, Begun, VisitRow
+from galley.records.rows import Arrival, Begun
 from galley.records.store import absences, arrivals, queries, visit_writes
 from galley.records.store.arrivals import Allocate, Plan
 from galley.records.store.store_base import StoreBase
@@ -28,44 +28,6 @@ class VisitStore(StoreBase):
         """
         names = {"token": link_secret(), "participant": participant_name()}
         return self.write(lambda connection: arrivals.begin(connection, arrival, names, plan, allocate))
-
-    def next_visit_no(self, study: str) -> Future[int]:
-        """A visit number of `study` that was never given out before, from 0."""
-        return self.write(lambda connection: visit_writes.next_visit_no(connection, study))
-
-    def create_visit(
-        self,
-        study: str,
-        study_sha256: str,
-        seed: int,
-        visit_no: int,
-        plan_json: str,
-        condition: Mapping[str, Any],
-        link_params: Mapping[str, str],
-        at_ms: float,
-    ) -> Future[VisitRow]:
-        """A new visit at its first step, outside every slot."""
-        values = {
-            "token": link_secret(),
-            "participant": participant_name(),
-            "study": study,
-            "study_sha256": study_sha256,
-            "seed": str(seed),
-            "visit_no": visit_no,
-            "plan_json": plan_json,
-            "condition": dict(condition),
-            "link_params": dict(link_params),
-            "created_ms": round(at_ms),
-        }
-        return self.write(lambda connection: visit_writes.create_visit(connection, values))
-
-    def visit(self, token: str) -> Future[VisitRow | None]:
-        """The visit behind a link, None if there is none."""
-        return self.read(lambda connection: queries.visit(connection, token))
-
-    def answers(self, visit_id: int) -> Future[dict[str, dict[str, Any]]]:
-        """For each step of the visit that was answered, its answers by item."""
-        return self.read(lambda connection: queries.answers(connection, visit_id))
 
     def enter_step(self, visit_id: int, step_id: str, at_ms: float) -> Future[None]:
         """Note that a step's page was sent; the first time counts as entering it."""
@@ -151,10 +113,6 @@ class VisitStore(StoreBase):
                 connection, visit_id, status, round(at_ms), completion_code
             )
         )
-
-    def seen(self, visit_id: int, at_ms: float) -> Future[None]:
-        """Note a sign of life; pages, answers, keys and pings count by themselves."""
-        return self.write(lambda connection: visit_writes.seen(connection, visit_id, round(at_ms)))
 
     def hidden(
         self, visit_id: int, step_id: str, started_ms: float, ended_ms: float | None = None

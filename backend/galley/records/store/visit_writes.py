@@ -21,9 +21,7 @@ from galley.records.database.tables import (
     STUDIES,
     VISITS,
 )
-from galley.records.rows import VisitRow
 from galley.records.store.absences import back_on_page
-from galley.records.store.queries import visit_row
 
 NEW_VISIT: dict[str, Any] = {
     **dict.fromkeys(("completion_code", "ended_ms", "slot", "consent_sha256", "person")),
@@ -46,27 +44,6 @@ def question_of(subscale: str) -> str:
 def subscale_of(question: str) -> str:
     """The subscale with this name among the questions; empty for an item, a round or a factor."""
     return question.removeprefix(SUBSCALE) if question.startswith(SUBSCALE) else ""
-
-
-def next_visit_no(connection: Connection, study: str) -> int:
-    """The next number of a study, given out for good."""
-    meet(connection, study)
-    # The update locks the row, so that two servers cannot read the same count.
-    here = STUDIES.c.name == study
-    connection.execute(update(STUDIES).where(here).values(visits_begun=STUDIES.c.visits_begun + 1))
-    return int(connection.execute(select(STUDIES.c.visits_begun).where(here)).scalar_one()) - 1
-
-
-def create_visit(connection: Connection, values: Mapping[str, Any]) -> VisitRow:
-    """The visit with these values, at its first step."""
-    meet(connection, values["study"])
-    there = (
-        connection.execute(select(VISITS).where(VISITS.c.token == values["token"])).mappings().one_or_none()
-    )
-    if there is not None:  # this job was done before, but the server never heard of it
-        return visit_row(dict(there))
-    whole = {**NEW_VISIT, "last_seen_ms": values["created_ms"], **values}
-    return visit_row({"id": new_id(connection, VISITS, whole), **whole})
 
 
 def new_id(connection: Connection, table: Table, values: Mapping[str, Any]) -> int:

@@ -153,8 +153,8 @@ class Visits:
         told = study.kept(params).get(name, "") if name is not None else ""
         return None if not told.strip() or is_placeholder(told, name or "") else told
 
-    def turned_away(self, study: Study, params: Mapping[str, str]) -> TurnedAway | None:
-        """What is wrong with a link that lets nobody in."""
+    async def _turned_away(self, study: Study, params: Mapping[str, str]) -> TurnedAway | None:
+        """What is wrong with a link that lets nobody in; of a study that takes nobody, that it does not."""
         if self.person(study, params) is not None:
             return None
         if study.invitations is not None:
@@ -162,6 +162,9 @@ class Visits:
         asked = study.config.recruitment
         if asked.participant is None or not asked.required:
             return None
+        state = await asyncio.wrap_future(self._store.study_state(study.name))
+        if state != "open":
+            return state
         LOG.warning(
             "%s: turned somebody away whose link has no id as %s but %r; check the link at the recruiter",
             study.name,
@@ -190,7 +193,7 @@ class Visits:
         link = await self.test_link(study, params)
         if link is not None:
             return "untested" if link == "bad" else None
-        wrong = self.turned_away(study, params)
+        wrong = await self._turned_away(study, params)
         if wrong is not None:
             return wrong
         arrival = self._arrival(study, params, study.language, test=False)
@@ -202,7 +205,7 @@ class Visits:
         if link == "bad":
             return "untested"
         test = self._preview or link is not None
-        wrong = None if test else self.turned_away(study, params)
+        wrong = None if test else await self._turned_away(study, params)
         if wrong is not None:
             return wrong
         spoken = study.in_language(language)
