@@ -62,6 +62,7 @@ def changed_under_way(place: Workspace) -> list[str]:
     from galley.agents.catalogue import Catalogue
     from galley.kitchen.layout_file import load_layouts
     from galley.records import Store
+    from galley.records.reading.overdue import under_way
     from galley.server.changed_files import kept_by, told_of_changes
     from galley.study.study import load_study
 
@@ -70,4 +71,4 @@ def changed_under_way(place: Workspace) -> list[str]:
     studies = {name: load_study(place, name) for name in place.names("studies")}
     has = kept_by(load_layouts(place), Catalogue(place))
     with Store.open(place.database) as store:
-        return store.read(lambda connection: list(told_of_changes(connection, studies, has))).result()
+        return list(told_of_changes(store.read(under_way).result(), studies, has))

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Mapping
-
-from sqlalchemy import Connection, select
+from collections.abc import Iterable, Iterator, Mapping
 
 from galley.agents.catalogue import Catalogue
 from galley.errors import GalleyError
 from galley.kitchen import Layout
-from galley.records.database.tables import VISITS
+from galley.records.reading.overdue import UnderWay
 from galley.study.study import Study
 from galley.study.visit.gone import Has, gone_of
 from galley.study.visit.plan import Plan
@@ -31,13 +29,12 @@ def kept_by(layouts: Mapping[str, Layout], agents: Catalogue) -> Has:
     return has
 
 
-def told_of_changes(connection: Connection, studies: Mapping[str, Study], has: Has) -> Iterator[str]:
+def told_of_changes(under_way: Iterable[UnderWay], studies: Mapping[str, Study], has: Has) -> Iterator[str]:
     """A line for each study whose visits under way need what is gone: how many, what, what will happen."""
-    query = select(VISITS.c.study, VISITS.c.plan_json, VISITS.c.step_index).where(VISITS.c.status == "active")
     strangers: Counter[str] = Counter()
     ending: dict[str, list[set[str]]] = defaultdict(list)
     missing: dict[str, list[set[str]]] = defaultdict(list)
-    for name, plan_json, step_index in connection.execute(query):
+    for name, plan_json, step_index in under_way:
         if name not in studies:
             strangers[name] += 1
             continue

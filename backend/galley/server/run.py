@@ -18,6 +18,7 @@ from fastapi import FastAPI
 
 from galley.errors import GalleyError
 from galley.records import Store
+from galley.records.reading.overdue import under_way
 from galley.server.app import create_app
 from galley.server.changed_files import kept_by, told_of_changes
 from galley.server.content import load_content
@@ -94,8 +95,8 @@ def _serve(workspace: Workspace, settings: Settings, database: str, *, preview: 
             )
             content = load_content(workspace, known.study)
             has = kept_by(content.layouts, content.agents)
-            told = store.read(lambda connection: list(told_of_changes(connection, content.studies, has)))
-            for line in told.result():
+            told = told_of_changes(store.read(under_way).result(), content.studies, has)
+            for line in told:
                 LOG.warning(line)
             app = create_app(content, store, known, preview=preview)
             # A thread that wants the interpreter gets it sooner: a tick waits less for an agent that thinks

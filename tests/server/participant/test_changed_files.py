@@ -10,6 +10,7 @@ import pytest
 
 from galley.commands.check import changed_under_way
 from galley.records.database.tables import RESPONSES, VISITS
+from galley.records.reading.overdue import under_way
 from galley.server.changed_files import kept_by, told_of_changes
 from galley.server.content import load_content
 from galley.workspace import KINDS, Workspace
@@ -82,9 +83,7 @@ def back(served: Served, person: Participant) -> Participant:
 def told(served: Served) -> list[str]:
     content = load_content(served.workspace)
     has = kept_by(content.layouts, content.agents)
-    return served.store.read(
-        lambda connection: list(told_of_changes(connection, content.studies, has))
-    ).result()
+    return list(told_of_changes(served.store.read(under_way).result(), content.studies, has))
 
 
 def test_f3_an_item_is_gone_and_the_visit_goes_on(lab: Workspace, tmp_path: Path) -> None:

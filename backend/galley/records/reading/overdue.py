@@ -1,4 +1,4 @@
-"""Visits that go on though their time has passed."""
+"""Visits under way: where they are in their plans, and those that go on though their time has passed."""
 
 from __future__ import annotations
 
@@ -8,6 +8,15 @@ from sqlalchemy import Connection, exists, or_, select
 
 from galley.records.database import leases
 from galley.records.database.tables import LEASES, ROUNDS, SEATS, VISITS
+
+UnderWay = tuple[str, str, int]
+"""The study of a visit under way, its plan as stored, the index of its step."""
+
+
+def under_way(connection: Connection) -> list[UnderWay]:
+    """Every active visit of every study."""
+    query = select(VISITS.c.study, VISITS.c.plan_json, VISITS.c.step_index).where(VISITS.c.status == "active")
+    return [(study, plan, int(index)) for study, plan, index in connection.execute(query)]
 
 
 def overdue_tokens(connection: Connection, begun_before: Mapping[str, float], owner: str) -> list[str]:
