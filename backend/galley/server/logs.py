@@ -8,9 +8,8 @@ import sys
 import time
 from typing import Final, TextIO
 
-from sqlalchemy.exc import SQLAlchemyError
-
 from galley.errors import GalleyError
+from galley.records.database.retries import DatabaseFailure
 
 FORM: Final = "%(levelname)s %(name)s: %(message)s"
 WINDOW_S: Final = 10.0
@@ -19,7 +18,7 @@ AT_ONCE: Final = 5
 
 MOST_KINDS: Final = 1000
 LONGEST: Final = 2000
-EXPECTED: Final = (GalleyError, OSError, SQLAlchemyError, UnicodeError)
+EXPECTED: Final = (GalleyError, OSError, DatabaseFailure, UnicodeError)
 """What the world does to a server: told in a line. Anything else is our fault and told in full, once."""
 
 SECRETS: Final = re.compile(

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import threading
 import time
+from typing import Final
 
 from sqlalchemy import Engine
-from sqlalchemy.exc import DBAPIError, OperationalError
+from sqlalchemy.exc import DBAPIError, OperationalError, SQLAlchemyError
 
 from galley.errors import GalleyError
 
 RETRY_FOR_S = 20.0
 FIRST_WAIT_S = 0.05
 LONGEST_WAIT_S = 1.0
+
+DatabaseFailure: Final = SQLAlchemyError
+"""What a database, or the way to it, answers when something goes wrong; for those who know no database."""
 
 
 class Retries:
