@@ -8,7 +8,6 @@ import shutil
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +26,7 @@ from galley.records.database.tables import METADATA
 from galley.records.export.study_export import export_study
 from galley.records.reading.flags import flags
 from galley.records.reading.verify import verify_study
-from galley.study.visit.plan import Step
+from galley.study.stages.stage_kinds import QuizStep
 from tests.postgres import Postgres
 from tests.records import databases
 from tests.records.databases import Database
@@ -205,7 +204,7 @@ def test_right_answers_that_were_kept_as_wrong_are_mended(empty: Database, tmp_p
     with engine.begin() as connection:
         for change in as_before:
             connection.execute(text(change))
-        written = json.dumps({**json.loads(plan().to_json()), "steps": [asdict(step) for step in steps]})
+        written = json.dumps({**json.loads(plan().to_json()), "steps": [step.stored() for step in steps]})
         connection.execute(text("UPDATE visits SET plan_json = :plan"), {"plan": written})
     engine.dispose()
     with Store.open(empty.url) as store:
@@ -220,9 +219,11 @@ def test_right_answers_that_were_kept_as_wrong_are_mended(empty: Database, tmp_p
     assert (row["rounds-1-questions.subscale.trust"], row["comparison.subscale.trust"]) == ("6", "6")
 
 
-def quiz(expected: dict[str, Any]) -> Step:
+def quiz(expected: dict[str, Any]) -> QuizStep:
     """A quiz as a plan held it."""
-    return Step("debrief", "quiz", "Quiz", {"questionnaire": "quiz", "expected": expected, "tries": 2})
+    return QuizStep(
+        id="debrief", title="Quiz", questionnaire="quiz", expected=expected, tries=2, after_last="go_on"
+    )
 
 
 def test_a_migration_keeps_the_data_and_what_points_at_it(empty: Database, scripts: Path) -> None:

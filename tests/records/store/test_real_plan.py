@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import csv
-import json
 from pathlib import Path
 
 import numpy as np
 
 from galley.kitchen import Kitchen
-from galley.records import Store
+from galley.records import Arrival, Planned, Store
 from galley.records.export.study_export import export_study
 from galley.records.reading.round_replay import state_bytes
 from galley.records.reading.verify import verify_study
+from galley.server.rounds.set_up import of_one
 from galley.study.study import load_study
 from galley.study.visit.plan import plan_visit, visit_seed
 from galley.study.visit.steps import QuestionsStep
@@ -42,11 +42,10 @@ def test_a_planned_visit_goes_through_the_records(tmp_path: Path) -> None:
     plan = plan_visit(study, visit_seed(study, 0), 0)
     compared = 0
     with Store.open(tmp_path / "galley.sqlite") as store:
-        number = store.next_visit_no(study.name).result()
-        seed, text = plan.visit_seed, plan.to_json()
-        visit = store.create_visit(
-            study.name, study.sha256, seed, number, text, plan.condition, {}, START_MS
-        ).result()
+        planned = Planned(plan.visit_seed, plan.to_json(), plan.condition)
+        arrival = Arrival(study.name, study.sha256, START_MS)
+        visit = store.begin_visit(arrival, lambda *_: planned).result().visit
+        assert visit is not None
         for place, step in enumerate(plan.steps):
             now = START_MS + 10_000 * place
             store.enter_step(visit.id, step.id, now).result()
@@ -58,22 +57,8 @@ def test_a_planned_visit_goes_through_the_records(tmp_path: Path) -> None:
                 compared += step.kind == "comparison"
             if step.kind == "round":
                 layout = study.layouts[step.layout].with_rules(horizon_ticks=step.ticks)
-                round_id = store.create_round(
-                    visit.id,
-                    step.id,
-                    step.round_no,
-                    json.dumps(layout.to_dict()),
-                    layout.name,
-                    layout.rules.horizon_ticks,
-                    step.tick_ms,
-                    step.human_seat,
-                    step.agent,
-                    "a" * 64,
-                    step.partner_hat,
-                    step.seed,
-                    now,
-                    human_hat=step.human_hat,
-                ).result()
+                new = of_one({step.layout: layout}, visit.id, step, step.agent, "a" * 64, now)
+                round_id = store.set_up_round(new).result()
                 actions = np.random.default_rng(place).integers(0, 6, (step.ticks, 2)).tolist()
                 kitchen = Kitchen(layout)
                 for a0, a1 in actions:

@@ -95,7 +95,7 @@ def test_a_silent_visit_loses_its_slot_to_the_next_arrival_only(store: Store) ->
 
 def test_signs_of_life_keep_a_slot(store: Store) -> None:
     first, second = begun(arrive(store)), begun(arrive(store))
-    store.back_on_page(first.id, START_MS + 50_000).result()
+    store.save_answers(first.id, "consent", {}, 1, "active", START_MS + 50_000).result()
     store.enter_step(second.id, "consent", START_MS + 50_000).result()
     assert begun(arrive(store, START_MS + EXPIRES_MS + 1)).slot == 2
 

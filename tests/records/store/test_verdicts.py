@@ -10,7 +10,7 @@ from galley.records import Store
 from galley.records.database.tables import ATTEMPTS, RESPONSES, VISITS
 from galley.records.reading.flags import flags
 from galley.study.scores import wrong_items
-from galley.study.visit.plan import Step
+from galley.study.stages.stage_kinds import QuizStep
 from galley.study.written.questionnaire import failed_checks, validate_answers
 from tests.records.helpers import START_MS, begin, plan
 from tests.study.written.test_questionnaire import made
@@ -39,7 +39,14 @@ def test_expected_choices_in_another_order_than_the_options_are_right_everywhere
 
 def test_a_quiz_that_goes_on_after_its_last_try_raises_no_flag_of_attention_checks(store: Store) -> None:
     visit = begin(store)
-    quiz = Step("consent", "quiz", "Quiz", {"questionnaire": "quiz", "expected": CHECKS.expected, "tries": 1})
+    quiz = QuizStep(
+        id="consent",
+        title="Quiz",
+        questionnaire="quiz",
+        expected=CHECKS.expected,
+        tries=1,
+        after_last="go_on",
+    )
     whole = replace(plan(), steps=(quiz, *plan().steps[1:]))
     store.write(
         lambda connection: connection.execute(update(VISITS).values(plan_json=whole.to_json()))
