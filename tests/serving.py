@@ -55,7 +55,7 @@ def served(
 
 
 def _wait_until_up(process: subprocess.Popen[bytes], log: Path) -> str:
-    for _ in range(1200):
+    for _ in range(3000):
         found = re.search(r"http://[^\s/]+:(\d+)", log.read_text())
         if found and found[1] != "0":
             return found[0]

@@ -136,7 +136,7 @@ def test_play_gives_both_seat_orders_and_repeats_itself() -> None:
         ("torch", "learn", "learn train sp --layout cramped_room --out run"),
         ("torch", "learn", "learn export run --name mine"),
         ("tqdm", "learn", "learn bc"),
-        ("matplotlib", "learn", "learn plot curves run --out x.svg"),
+        ("matplotlib", "plot", "learn plot curves run --out x.svg"),
         ("distributed", "evaluate", "evaluate cramped_room --workers 2"),
     ],
 )

@@ -93,17 +93,6 @@ export const release = (reason, seq, now) => ({ type: "release", reason, seq, cl
 export const ping = (now, rtt) => ({ type: "ping", client_ms: now, rtt_ms: rtt });
 
 /**
- * The keyframe of a kitchen that nobody plays, for a picture of it.
- * @param {string[]} grid @param {[ChefRow, ChefRow]} chefs @param {PotRow[]} pots @param {[string, string]} hats
- * @returns {Keyframe}
- */
-export const stillFrame = (grid, chefs, pots, hats) => ({
-  type: "keyframe", phase: "waiting", tick: 99, horizon: 99, tick_ms: 150, seat: 0, hats, grid, cook_time: 20, chefs,
-  things: [], pots, score: 0, goal: null, round: 1, of: 1, tutorial: false, orders: null,
-  episode: 1, episodes: 1, partner: "agent", input_mode: "hold", show_score: "during", points: 20,
-});
-
-/**
  * The server's message in a text frame, or null for anything this page does not know.
  * @param {unknown} text
  * @returns {ServerMessage | null}

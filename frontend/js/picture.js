@@ -3,7 +3,7 @@
 import { boardFrom } from "./board.js";
 import { draw } from "./draw.js";
 import { still } from "./backdrop.js";
-import { stillFrame } from "./messages.js";
+import { stillFrame } from "./still_frame.js";
 import { HATS, Sprites, loadImages, newCanvas } from "./sprites.js";
 import { tileFor } from "./view.js";
 

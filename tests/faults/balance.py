@@ -71,6 +71,8 @@ class Recruiting:
         self.why[begun.why] += 1
         if begun.visit is not None:
             self.under_way.append(begun.visit)
+            agreed = self.store.save_answers(begun.visit.id, "consent", {}, 1, "active", round(now_ms))
+            assert agreed.result()
         elif begun.why == "later":
             self.now_ms += MINUTE_MS
 
@@ -82,7 +84,7 @@ class Recruiting:
             how = self.rng.choice(["declined", "failed_checks", "silent", "silent"])
         if (
             how != "silent"
-            and not self.store.save_answers(visit.id, "consent", {}, 1, how, round(self.now_ms)).result()
+            and not self.store.save_answers(visit.id, "play", {}, 2, how, round(self.now_ms)).result()
         ):
             how = "too late"
         self.left[how] += 1

@@ -23,10 +23,10 @@ VIEW = RoundView(150, 1, 2, False, 40, 1, 0, ("blue", "orange"))
 
 
 def node(script: str, given: object = None) -> Any:
-    """What a script prints as JSON; `board` and `messages` are those modules, `given` its input."""
+    """What a script prints as JSON; it has the modules `board`, `messages`, `still_frame`, and `given`."""
     start = "".join(
         f"import * as {name} from {json.dumps((FRONTEND / f'js/{name}.js').as_uri())};\n"
-        for name in ("board", "messages")
+        for name in ("board", "messages", "still_frame")
     )
     start += "const given = JSON.parse(await new Response(process.stdin).text());\n"
     done = subprocess.run(
@@ -99,7 +99,7 @@ def test_the_keyframe_of_a_picture_is_one_of_the_protocol() -> None:
     script = """
         const chefs = [[1, 1, 2, 1], [3, 1, 1, 4]];
         const pots = [[2, 0, 3, 0, 20, true]];
-        console.log(JSON.stringify(messages.stillFrame(given, chefs, pots, ["blue", "orange"])));
+        console.log(JSON.stringify(still_frame.stillFrame(given, chefs, pots, ["blue", "orange"])));
     """
     frame = node(script, Scene(RING).grid)
     assert parse_outgoing(json.dumps(frame)) == frame

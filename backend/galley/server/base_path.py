@@ -95,22 +95,20 @@ class BasePath:
             told = Headers(scope=scope).get(HEADER, "").split(",")[0].strip().rstrip("/")
             base = told if PATH.fullmatch(told) else ""
         _BASE.set(base)
-        if not base:
-            await self._app(scope, receive, send)
-            return
         here = str(Request({**scope, "type": "http"}).base_url) if scope["type"] == "http" else ""
 
         async def send_with_base(message: Message) -> None:
             if message["type"] == "http.response.start":
                 headers = MutableHeaders(scope=message)
                 if "location" in headers:
-                    # Redirects to the same path without its last slash name the whole site.
+                    # Redirects to the same path without its last slash name the whole site, by a Host that
+                    # a proxy may have changed.
                     location = headers["location"]
                     headers["location"] = at(
                         f"/{location[len(here) :]}" if location.startswith(here) else location
                     )
                 message["headers"] = [
-                    (name, _cookie(value, base) if name == b"set-cookie" else value)
+                    (name, _cookie(value, base) if base and name == b"set-cookie" else value)
                     for name, value in message["headers"]
                 ]
             await send(message)

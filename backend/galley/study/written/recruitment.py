@@ -33,9 +33,13 @@ Code = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=64)]
 Redirect = Annotated[str, Field(pattern=r"^https://\S+$", max_length=500)]
 
 _BRACKETS: Final = re.compile(r"[{}\[\]<>$%*#]")
+_NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
+_WRITTEN: Final = re.compile(r"[\s='\"]")
+"""What a name in brackets does not hold: such a value was written by somebody."""
 _NOBODY: Final = {
     *("undefined", "null", "none", "nil", "nan", "n/a", "id", "pid", "participant", "your_id"),
     "assignment_id_not_available",
+    "[object object]",
 }
 """What stands in links for an id that nobody filled in, in lower case."""
 
@@ -167,10 +171,10 @@ def is_placeholder(value: str, name: str = "") -> bool:
     """
     plain = value.strip()
     return (
-        bool(_BRACKETS.search(plain))
+        bool(_BRACKETS.search(plain) and not _WRITTEN.search(plain))
         or not plain.strip("-_.")
         or plain.casefold() in _NOBODY
-        or (bool(name) and _letters(plain) == _letters(name))
+        or (_NAME.fullmatch(name) is not None and _letters(plain) == _letters(name))
         or bool(re.fullmatch(r"__.*__|:[A-Za-z_]+", plain))
     )
 
