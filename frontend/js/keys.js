@@ -9,6 +9,25 @@ const CODES = Object.freeze(/** @type {Record<string, Key>} */ ({
   KeyW: "up", KeyS: "down", KeyA: "left", KeyD: "right",
   Space: "interact", Enter: "interact", NumpadEnter: "interact",
 }));
+/** Keys by what they mean, where the place says nothing: keyboards on the screen, remote desktops, the number pad. */
+const MEANINGS = Object.freeze(/** @type {Record<string, Key>} */ ({
+  ArrowUp: "up", ArrowDown: "down", ArrowLeft: "left", ArrowRight: "right", " ": "interact", Enter: "interact",
+}));
+const LETTERS = Object.freeze(/** @type {Record<string, Key>} */ ({ w: "up", s: "down", a: "left", d: "right" }));
+/** How often the pulse of a held key is felt, and after how many beats without a repeat it counts as let go. */
+const PULSE_MS = 100;
+const QUIET_BEATS = 8;
+
+/** @param {KeyboardEvent} event @returns {Key | undefined} */
+function keyOf(event) {
+  const placeless = event.code === "" || event.code === "Unidentified";
+  return CODES[event.code] ?? MEANINGS[event.key] ?? (placeless ? LETTERS[event.key.toLowerCase()] : undefined);
+}
+
+/** What names a key from its press to its release. @param {KeyboardEvent} event */
+function holderOf(event) {
+  return event.code && event.code !== "Unidentified" ? event.code : event.key.toLowerCase();
+}
 
 export class Keys {
   /**
@@ -21,8 +40,12 @@ export class Keys {
     this.enabled = false;
     /** @type {Map<string, Key>} what holds each key down: a key code or a finger */
     this.held = new Map();
+    /** The key pressed last, how often it has repeated, and for how many beats it has not: only it repeats. */
+    this.pulse = { holder: "", repeats: 0, quiet: 0 };
+    this.stopped = ""; // held, but its repeats stopped; if they come again it was not let go
     window.addEventListener("keydown", (event) => this.keyDown(event));
-    window.addEventListener("keyup", (event) => this.up(event.code));
+    window.addEventListener("keyup", (event) => this.keyUp(event));
+    window.setInterval(() => this.beat(), PULSE_MS);
     window.addEventListener("blur", () => this.releaseAll("blur"));
     window.addEventListener("pagehide", () => this.releaseAll("pagehide"));
     document.addEventListener("visibilitychange", () => this.releaseAll(document.hidden ? "hidden" : "shown"));
@@ -36,17 +59,39 @@ export class Keys {
 
   /** @param {KeyboardEvent} event */
   keyDown(event) {
-    const key = CODES[event.code];
+    const holder = holderOf(event);
+    if (holder !== this.pulse.holder) this.pulse = { holder, repeats: 0, quiet: 0 };
+    else if (event.repeat) Object.assign(this.pulse, { repeats: this.pulse.repeats + 1, quiet: 0 });
+    if (event.key === "Meta" && this.held.size > 0) this.releaseAll("meta"); // macOS tells no release while it is down
+    const key = keyOf(event);
     if (!key || !this.enabled || event.ctrlKey || event.metaKey || event.altKey) return;
-    const focused = document.activeElement;
-    if (key === "interact" && focused instanceof HTMLButtonElement && !focused.dataset.key) return;
     event.preventDefault();
-    if (!event.repeat) this.down(event.code, key);
+    if (!event.repeat || this.stopped === holder) this.down(holder, key);
+  }
+
+  /** @param {KeyboardEvent} event */
+  keyUp(event) {
+    const holder = holderOf(event);
+    if (this.pulse.holder === holder) this.pulse = { holder: "", repeats: 0, quiet: 0 };
+    if (event.key === "Meta" && this.held.size > 0) this.releaseAll("meta");
+    if (this.held.has(holder)) event.preventDefault(); // a button that has the focus is not pressed by it
+    this.up(holder);
+  }
+
+  /** Lets go of a held key that repeated and has stopped to, for its release got lost; beats late or early do no harm. */
+  beat() {
+    const { holder, repeats } = this.pulse;
+    if (repeats < 2 || !this.held.has(holder)) return;
+    this.pulse.quiet += 1;
+    if (this.pulse.quiet < QUIET_BEATS) return;
+    this.stopped = holder;
+    this.up(holder);
   }
 
   /** @param {string} holder @param {Key} key */
   down(holder, key) {
     if (!this.enabled || this.held.get(holder) === key) return;
+    this.stopped = "";
     this.up(holder);
     const already = this.isHeld(key);
     this.held.set(holder, key);

@@ -20,7 +20,7 @@ export const KEYS = /** @type {const} */ (["up", "down", "left", "right", "inter
 export const CLOSE = Object.freeze({ elsewhere: 4001, over: 4002, refused: 4003 });
 
 /** @typedef {typeof KEYS[number]} Key */
-/** @typedef {"blur" | "hidden" | "shown" | "pagehide"} ReleaseReason */
+/** @typedef {"blur" | "hidden" | "shown" | "pagehide" | "meta"} ReleaseReason */
 /** @typedef {"waiting" | "countdown" | "playing" | "paused" | "ended"} Phase */
 /** @typedef {[x: number, y: number, facing: number, held: number]} ChefRow cell, facing 0-3 = N S E W, thing code */
 /** @typedef {[x: number, y: number, thing: number]} ThingRow thing 0 clears the cell */

@@ -40,6 +40,8 @@ class Round {
       (reason) => this.link.send(release(reason, this.link.nextSeq(), performance.now())),
     );
     for (const area of root.querySelectorAll("[data-part=touch]")) if (area instanceof HTMLElement) this.keys.touch(area);
+    // A click leaves no focus behind: Space and Enter belong to the kitchen.
+    root.addEventListener("mousedown", (event) => event.preventDefault());
     window.addEventListener("touchstart", () => root.classList.add("fingers"), { once: true, passive: true });
     this.link.open();
   }

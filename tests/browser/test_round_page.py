@@ -85,6 +85,140 @@ def test_the_button_of_a_card_is_seen_whole_on_every_screen(
     assert seen
 
 
+KEY_EVENT = """([type, code, key, metaKey = false, repeat = false]) => {
+  const event = new KeyboardEvent(type, {code, key, metaKey, repeat, bubbles: true, cancelable: true});
+  (document.activeElement ?? document.body).dispatchEvent(event);
+}"""
+
+
+def send(page: Page, *event: object) -> None:
+    """A keyboard event that no real keyboard of the test machine sends."""
+    page.evaluate(KEY_EVENT, list(event))
+
+
+def test_f2_a_click_leaves_no_focus_and_space_and_enter_cook(server: Server, page: Page) -> None:
+    playing(server)
+    sound = page.locator("[data-part=sound]")
+    sound.click()
+    assert sound.get_attribute("aria-pressed") == "true"
+    assert page.evaluate("() => document.activeElement === document.body")
+    for press in ("Space", "Enter"):
+        page.keyboard.press(press)
+    server.wait_for("key", 4)
+    sound.focus()  # by the tabulator
+    for press in ("Space", "Enter"):
+        page.keyboard.press(press)
+    server.wait_for("key", 8)
+    assert server.keys() == [("interact", True), ("interact", False)] * 4
+    assert sound.get_attribute("aria-pressed") == "true"
+
+
+def test_f6_meta_lets_go_of_everything(server: Server, page: Page) -> None:
+    playing(server)
+    send(page, "keydown", "ArrowDown", "ArrowDown")
+    send(page, "keydown", "MetaLeft", "Meta", True)
+    assert server.wait_for("release")[0]["reason"] == "meta"
+    send(page, "keyup", "MetaLeft", "Meta")
+    send(page, "keydown", "ArrowDown", "ArrowDown")  # and it can be pressed again
+    send(page, "keyup", "ArrowDown", "ArrowDown")
+    server.wait_for("key", 3)
+    assert server.keys() == [("down", True), ("down", True), ("down", False)]
+
+
+def test_f6_a_held_key_that_stops_to_repeat_is_let_go(server: Server, page: Page) -> None:
+    playing(server)
+    send(page, "keydown", "KeyA", "a")
+    page.wait_for_timeout(1200)  # keyboards that never repeat are believed
+    assert server.keys() == [("left", True)]
+    for _ in range(3):
+        send(page, "keydown", "KeyA", "a", False, True)
+    server.wait_for("key", 2)
+    assert server.keys() == [("left", True), ("left", False)]
+    send(page, "keydown", "KeyA", "a", False, True)  # they come again: it was held after all
+    server.wait_for("key", 3)
+    assert server.keys()[2:] == [("left", True)]
+
+
+def test_f6_a_key_whose_repeats_another_key_took_over_stays_held(server: Server, page: Page) -> None:
+    playing(server)
+    send(page, "keydown", "ArrowUp", "ArrowUp")
+    for _ in range(3):
+        send(page, "keydown", "ArrowUp", "ArrowUp", False, True)
+    send(page, "keydown", "Space", " ")
+    send(page, "keyup", "Space", " ")
+    page.wait_for_timeout(1200)
+    assert server.keys() == [("up", True), ("interact", True), ("interact", False)]
+
+
+@pytest.mark.parametrize(
+    ("code", "key", "means"),
+    [
+        ("", "ArrowLeft", "left"),
+        ("Numpad4", "ArrowLeft", "left"),
+        ("Unidentified", "d", "right"),
+        ("", "W", "up"),
+        ("", " ", "interact"),
+        ("KeyX", "w", None),
+        ("KeyW", "z", "up"),
+    ],
+)
+def test_f22_keys_without_a_place_count_by_their_meaning(
+    server: Server, page: Page, code: str, key: str, means: str | None
+) -> None:
+    playing(server)
+    send(page, "keydown", code, key)
+    send(page, "keyup", code, key)
+    send(page, "keydown", "ArrowDown", "ArrowDown")
+    server.wait_for("key", 1 if means is None else 3)
+    assert server.keys()[:-1] == ([] if means is None else [(means, True), (means, False)])
+
+
+COVERED = """selector => [...document.querySelectorAll(selector)].filter(button => {
+  const at = button.getBoundingClientRect();
+  if (at.width === 0 || getComputedStyle(button).visibility === 'hidden') return false;
+  return [[.5, .5], [.1, .5], [.9, .5], [.5, .1], [.5, .9]].some(([x, y]) => {
+    const hit = document.elementFromPoint(at.left + x * at.width, at.top + y * at.height);
+    return hit?.closest('button') !== button;
+  });
+}).map(button => button.outerHTML)"""
+SCREENS = [(640, 360), (1280, 300), (844, 390), (320, 568), (568, 320), (390, 844), (1024, 600), (320, 256)]
+
+
+@pytest.mark.parametrize("touch", [True, False])
+@pytest.mark.parametrize(("width", "height"), SCREENS)
+def test_f26_d16_nothing_covers_a_button_or_a_word(
+    browser: Browser, width: int, height: int, touch: bool
+) -> None:
+    """A card's words (F26) and a round's buttons (D16) are not covered, in a test visit's practice too."""
+    context = browser.new_context(
+        viewport={"width": width, "height": height}, has_touch=touch, is_mobile=touch, reduced_motion="reduce"
+    )
+    small = context.new_page()
+    page = {"/round": lambda: render("round.html", skippable=True, test=True, round_no=None, bonus=None)}
+    played = Server(small, page)
+    small.goto(f"{HOST}/round")
+    played.wait_for("hello")
+    played.say(KEYFRAME)
+    expect(small.locator("[data-part=card-button]")).to_be_focused()
+    words = small.locator(".card-words").bounding_box()
+    button = small.locator("[data-part=card-button]").bounding_box()
+    assert words is not None
+    assert button is not None
+    assert words["y"] + words["height"] <= button["y"] + 0.5
+    assert small.evaluate(COVERED, ".card button") == []
+    if height <= 300:  # so low a window only has to show the card
+        context.close()
+        return
+    assert small.locator(".card-words").evaluate("words => words.scrollHeight - words.clientHeight") <= 1
+    small.locator("[data-part=card-button]").click()
+    played.wait_for("ready")
+    played.say({"type": "countdown", "seconds": 3}, KEYFRAME | {"phase": "playing"}, tick(1))
+    expect(small.locator("[data-part=over]")).to_be_hidden()
+    covered = small.evaluate(COVERED, ".round button")
+    context.close()
+    assert covered == []
+
+
 def test_losing_the_keyboard_lets_go_of_everything(server: Server, page: Page) -> None:
     playing(server)
     page.keyboard.down("ArrowLeft")

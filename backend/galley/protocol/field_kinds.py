@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final
 from galley.outcomes import ROUND_OUTCOMES
 
 KEYS = ("up", "down", "left", "right", "interact")
-RELEASE_REASONS = ("blur", "hidden", "shown", "pagehide")
+RELEASE_REASONS = ("blur", "hidden", "shown", "pagehide", "meta")
 PHASES = ("waiting", "countdown", "playing", "paused", "ended")
 OUTCOMES = (*ROUND_OUTCOMES, "partner_left")
 SHOW_SCORE = ("during", "after", "never")
