@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -52,6 +52,12 @@ def questionnaire(words: str = HOSTILE) -> Questionnaire:
 
 
 QUESTIONNAIRE = questionnaire()
+SAID_ALOUD = (
+    *("aria-label", "alt", "title", "placeholder"),
+    *("data-title", "data-text", "data-you", "data-words"),
+)
+"""Attributes whose words participants read or hear."""
+
 OUTCOMES = (*VISIT_OUTCOMES, "full", "later", "paused", "closed")
 
 
@@ -112,6 +118,24 @@ def contexts(words: str = HOSTILE) -> dict[str, dict[str, Any]]:
         "round.html": visit("round", **round_page),
         "debrief.html": visit("debrief", **end),
     }
+
+
+def variants() -> Iterator[tuple[str, str, dict[str, Any]]]:
+    """(name, template, context) of every page as it may look; the study says `1` everywhere."""
+    for name, values in contexts("1").items():
+        yield name, name, values
+    for outcome in OUTCOMES:
+        yield f"ending.html {outcome}", "ending.html", contexts("1")["ending.html"] | {"outcome": outcome}
+    base = contexts("1")
+    for fallback in ("go_on", "agent"):
+        yield f"lobby {fallback}", "lobby.html", base["lobby.html"] | {"fallback": fallback}
+    for partner in ("none", "human"):
+        more = {"partner": partner, "input_mode": "press", "round_no": 0, "episodes": 2}
+        yield f"round {partner}", "round.html", base["round.html"] | more
+    answered = {"problems": {"age": "1", "one": "1"}, "early": False}
+    yield "questionnaire problems", "questionnaire.html", base["questionnaire.html"] | answered
+    yield "quiz fresh", "quiz.html", base["quiz.html"] | {"wrong": {}, "tries_left": 1}
+    yield "studies none", "studies.html", {"studies": [], "query": ""}
 
 
 def _in_words(page: Mapping[str, Any], words: str) -> dict[str, Any]:

@@ -12,22 +12,12 @@ from babel.messages.pofile import read_po
 
 from galley.server.templates import translated_templates
 from galley.translations import FOLDER, KEYWORDS, Catalogues, Translator, language_name, mark
-from tests.frontend.pages import FRONTEND, OUTCOMES, Page, contexts
+from tests.frontend.pages import FRONTEND, SAID_ALOUD, Page, variants
 
 ROOT = Path(__file__).parents[2]
 PLACES = re.compile(r"%\(\w+\)s|\{\w+\}|</?\w+>")
 LANGUAGES = sorted(path.parts[-3] for path in FOLDER.glob("*/LC_MESSAGES/galley.po"))
 OPENED, CLOSED = "\N{LEFT WHITE SQUARE BRACKET}", "\N{RIGHT WHITE SQUARE BRACKET}"
-SAID_ALOUD = (
-    "aria-label",
-    "alt",
-    "title",
-    "placeholder",
-    "data-title",
-    "data-text",
-    "data-you",
-    "data-words",
-)
 
 
 def _sources() -> Iterator[tuple[str, Path]]:
@@ -55,21 +45,24 @@ def test_messages_are_found_in_templates_and_code() -> None:
     assert {"Begin", "Time is up!", "Please choose one answer.", "Round {n} of {of}"} <= set(MESSAGES)
 
 
-def test_chinese_is_shipped() -> None:
-    assert "zh" in LANGUAGES
+def test_d4_five_languages_are_shipped_beside_english() -> None:
+    assert LANGUAGES == ["de", "es", "fr", "ja", "zh"]
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
-def test_every_message_is_translated_with_the_same_places(language: str) -> None:
+def test_d4_every_message_is_translated_with_the_same_places(language: str) -> None:
     with (FOLDER / language / "LC_MESSAGES/galley.po").open("rb") as file:
         catalogue = read_po(file)
     said = {message.id if isinstance(message.id, str) else message.id[0]: message for message in catalogue}
     assert [name for name in MESSAGES if name not in said] == []
+    assert [name for name in said if name and name not in MESSAGES] == []
     for name, forms in MESSAGES.items():
         message = said[name]
         assert not message.fuzzy, name
         assert (message.id if len(forms) > 1 else (message.id,)) == forms
-        for words in (message.string,) if isinstance(message.string, str) else message.string:
+        spoken = (message.string,) if isinstance(message.string, str) else message.string
+        assert len(spoken) == (catalogue.num_plurals if len(forms) > 1 else 1), name
+        for words in spoken:
             assert words.strip(), name
             assert set(PLACES.findall(words)) == set(PLACES.findall(forms[-1])), name
 
@@ -87,24 +80,7 @@ class Marking(Translator):
         return self.gettext(one if n == 1 else many)
 
 
-def _pages() -> Iterator[tuple[str, str, dict[str, object]]]:
-    for name, values in contexts("1").items():
-        yield name, name, values
-    for outcome in OUTCOMES:
-        yield f"ending.html {outcome}", "ending.html", contexts("1")["ending.html"] | {"outcome": outcome}
-    base = contexts("1")
-    for fallback in ("go_on", "agent"):
-        yield f"lobby {fallback}", "lobby.html", base["lobby.html"] | {"fallback": fallback}
-    for partner in ("none", "human"):
-        more = {"partner": partner, "input_mode": "press", "round_no": 0, "episodes": 2}
-        yield f"round {partner}", "round.html", base["round.html"] | more
-    answered = {"problems": {"age": "1", "one": "1"}, "early": False}
-    yield "questionnaire problems", "questionnaire.html", base["questionnaire.html"] | answered
-    yield "quiz fresh", "quiz.html", base["quiz.html"] | {"wrong": {}, "tries_left": 1}
-    yield "studies none", "studies.html", {"studies": [], "query": ""}
-
-
-@pytest.mark.parametrize(("template", "values"), [pytest.param(*page[1:], id=page[0]) for page in _pages()])
+@pytest.mark.parametrize(("template", "values"), [pytest.param(*page[1:], id=page[0]) for page in variants()])
 def test_no_word_reaches_a_participant_past_the_catalogue(template: str, values: dict[str, object]) -> None:
     catalogues = Catalogues([Marking()])
     page = Page(
@@ -136,6 +112,8 @@ def test_a_language_is_found_by_what_browsers_send() -> None:
     assert catalogues.languages == ("en", *(code.replace("_", "-") for code in LANGUAGES))
     for code in ("zh", "zh-CN", "ZH-hans-cn", "zh_TW"):
         assert catalogues.translator(code)("Begin") == "开始"
+    for code in ("de", "de-AT", "DE-ch-1996"):
+        assert catalogues.translator(code)("Begin") == "Beginnen"
     for code in ("en", "en-GB", "xx", "", "zhh"):
         assert catalogues.translator(code)("Begin") == "Begin"
 
@@ -176,3 +154,18 @@ def test_languages_are_called_what_they_call_themselves() -> None:
         "Português (Brasil)",
         "xx-yy",
     ]
+
+
+@pytest.mark.parametrize(
+    ("language", "none", "one", "many"),
+    [
+        ("de", "etwa 0 Minuten", "etwa 1 Minute", "etwa 2 Minuten"),
+        ("es", "alrededor de 0 minutos", "alrededor de 1 minuto", "alrededor de 2 minutos"),
+        ("fr", "environ 0 minute", "environ 1 minute", "environ 2 minutes"),
+        ("ja", "約 0 分", "約 1 分", "約 2 分"),
+    ],
+)
+def test_d4_numbers_choose_forms_as_the_language_does(language: str, none: str, one: str, many: str) -> None:
+    translator = Catalogues.load().translator(language)
+    forms = ("about %(count)s minute", "about %(count)s minutes")
+    assert [translator.ngettext(*forms, n) % {"count": n} for n in (0, 1, 2)] == [none, one, many]

@@ -40,7 +40,7 @@ STUDY = """\
 format: 1
 title: Remarks
 seed: 1
-languages: [fr]
+languages: [it]
 completion: {code: DONE-1}
 factors:
   group: {levels: ["NA", control]}
@@ -58,7 +58,7 @@ def workspace(folder: Path, layout: str = SPARE) -> Workspace:
     for name in ("consent", "debrief"):
         found = next(ROOT.rglob(f"texts/{name}.en.md"), None) or next(ROOT.rglob(f"texts/{name}.md"))
         texts.mkdir(exist_ok=True)
-        shutil.copy(found, texts / f"{name}.fr.md")
+        shutil.copy(found, texts / f"{name}.it.md")
     (folder / "layouts" / "spare.yaml").write_text(layout, encoding="utf-8")
     (folder / "questionnaires" / "missing.yaml").write_text(MISSING, encoding="utf-8")
     (folder / "studies").mkdir()
@@ -97,7 +97,7 @@ def test_f21_d4_missing_words_and_languages_without_a_catalogue_are_remarked(
     told = [str(remark) for remark in study_remarks(place, load_study(place, "remarks"))]
     assert any(one.startswith("studies/remarks.yaml:7: 'NA' is what pandas and R read as") for one in told)
     assert sum("questionnaires/missing.yaml:8: 'n" in one for one in told) == 2
-    assert any("not translated to 'fr'" in one for one in told)
+    assert any("not translated to 'it'" in one for one in told)
     assert not any("'control'" in one or "'some'" in one for one in told)
 
 
