@@ -42,7 +42,7 @@ function digit(event) {
   const focused = event.target;
   if (!(focused instanceof HTMLInputElement) || focused.type !== "radio" || event.ctrlKey || event.altKey || event.metaKey) return;
   const scale = focused.closest(".scale");
-  const point = /^[1-9]$/.test(event.key) && scale?.querySelector(`input[value="${event.key}"]`);
+  const point = /^[0-9]$/.test(event.key) && scale?.querySelector(`input[value="${event.key}"]`);
   if (point instanceof HTMLInputElement) {
     event.preventDefault();
     point.focus();

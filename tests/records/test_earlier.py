@@ -30,7 +30,7 @@ BEFORE = lived.HERE / "c05f99f"
 STEPS = ("alone", "practice", *(f"games-{n}" for n in (1, 2, 3, 4)), "twice-5", "pair-6")
 ADDED: Mapping[str, frozenset[str]] = {
     "participants": frozenset({"bonus", "bonus_unit"}),
-    "responses": frozenset({"subscale", "subscale_value", "dyad"}),
+    "responses": frozenset({"subscale", "subscale_value", "dyad", "start"}),
     "rounds": frozenset({"dyad", "bonus", "bonus_unit"}),
     "subscales": frozenset({"dyad"}),
     "wide": frozenset({"about.subscale.mood", "load.subscale.workload"})

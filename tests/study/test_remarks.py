@@ -101,6 +101,15 @@ def test_f21_d4_missing_words_and_languages_without_a_catalogue_are_remarked(
     assert not any("'control'" in one or "'some'" in one for one in told)
 
 
+def test_f14_answers_that_proxies_may_not_pass_on_are_remarked(tmp_path: Path) -> None:
+    place = workspace(tmp_path / "lab")
+    asked = "".join(f"  - {{id: q{n}, kind: long_text, text: More?, max_length: 20000}}\n" for n in range(6))
+    file = place.folder("questionnaires") / "missing.yaml"
+    file.write_text(MISSING + asked, encoding="utf-8")
+    told = [str(remark) for remark in study_remarks(place, load_study(place, "remarks"))]
+    assert any("questionnaires/missing.yaml:4: the longest answers take 1.0 MiB" in one for one in told)
+
+
 def test_d14_one_study_is_checked_alone_and_remarks_come_first(tmp_path: Path) -> None:
     place = workspace(tmp_path / "lab")
     (place.folder("studies") / "broken.yaml").write_text("format: 1\n", encoding="utf-8")

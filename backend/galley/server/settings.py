@@ -58,7 +58,13 @@ class Settings:
     think_window_ms: int = _row(
         10, "THINK_WINDOW_MS", "How far apart batches of agents' decisions begin at least, ms.", 0, 50
     )
-    max_form_kib: int = _row(256, "MAX_FORM_KIB", "Largest form that is read, KiB.", 1, 10_240)
+    max_form_kib: int = _row(
+        256,
+        "MAX_FORM_KIB",
+        "Largest form that is read, KiB; more where questions need it.",
+        1,
+        10_240,
+    )
     messages_per_s: int = _row(
         200,
         "MESSAGES_PER_S",

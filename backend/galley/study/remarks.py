@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Final
 
 from galley.errors import Problem
 from galley.files.reading import Loc, read
@@ -12,6 +13,8 @@ from galley.study.written.study_file import StudyFile
 from galley.translations import SOURCE, Catalogues
 from galley.workspace import Workspace
 
+PROXY_FORM_BYTES: Final = 1024 * 1024
+"""What nginx passes on of a form unless it is told otherwise (client_max_body_size)."""
 READ_AS_MISSING = frozenset(
     ("null", "nan", "na", "n/a", "<na>", "#n/a", "#na", "none", "nil", "-nan", "1.#ind", "1.#qnan", "")
 )
@@ -32,6 +35,13 @@ def study_remarks(workspace: Workspace, study: Study) -> Iterator[Problem]:
     for name, questionnaire in study.questionnaires.items():
         file = workspace.find("questionnaires", name)
         lines = read(file, workspace.shown(file)).lines
+        most = questionnaire.form_size[0]
+        if most > PROXY_FORM_BYTES:
+            told = (
+                f"the longest answers take {most / PROXY_FORM_BYTES:.1f} MiB, and many proxies pass on 1 MiB"
+            )
+            fix = "lower max_length, ask on two pages, or see the limits in docs/scaling-out.md"
+            yield Problem(workspace.shown(file), lines.get(("items",), 1), told, fix)
         for place, item in enumerate(questionnaire.items):
             for n, option in enumerate(item.choosable):
                 loc: Loc = ("items", place, "options", n, "value")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from concurrent.futures import Future
+from pathlib import Path
 
 import httpx
 import pytest
@@ -14,7 +15,7 @@ from galley.kitchen import Kitchen, Layout
 from galley.records.database.tables import RESPONSES, STAGES
 from galley.records.store import queries
 from galley.study.study import load_study
-from tests.records.stored import stored_visit
+from tests.records.stored import stored_answers, stored_visit
 from tests.server.helpers import QUICK, Participant, Served, good_answers, serving
 from tests.study.workspaces import study_workspace
 
@@ -220,6 +221,44 @@ def test_forms_that_cannot_be_read_are_refused_and_lose_nothing(served: Served) 
     assert http.post(person.path, content=b"step=survey&%ff%00=%zz").status_code == 422
     person.load()
     assert person.stage == "questionnaire"
+
+
+LONG = """\
+format: 1
+title: Tell us more
+source: made for this test
+items:
+  - {id: one, kind: long_text, text: First part, max_length: 20000, required: false}
+  - {id: two, kind: long_text, text: Second part, max_length: 20000, required: false}
+"""
+ASKED = """\
+format: 1
+title: Long answers
+seed: 1
+completion: {code: LONG-1}
+stages:
+  - {kind: consent, text: consent}
+  - {kind: questionnaire, id: survey, questionnaire: long-answers}
+  - {kind: debrief, text: debrief}
+"""
+
+
+def test_f14_a_page_takes_the_longest_answers_that_it_allows(tmp_path: Path) -> None:
+    workspace = study_workspace(tmp_path / "lab", ASKED)
+    (workspace.folder("questionnaires") / "long-answers.yaml").write_text(LONG, encoding="utf-8")
+    answers = dict.fromkeys(("one", "two"), "一" * 20000)
+    with serving(workspace, tmp_path / "records.sqlite") as served:
+        person = Participant(served)
+        person.agree()
+        beyond = person.submit({name: words * 3 for name, words in answers.items()})
+        assert beyond.status_code == 413
+        assert "Your answers are longer than this page takes." in beyond.text
+        person.load()
+        person.submit(answers)
+        assert person.stage == "debrief"
+        row = stored_visit(served.store, person.token)
+        assert row is not None
+        assert stored_answers(served.store, row.id)["survey"] == answers
 
 
 def test_forms_of_other_sites_are_not_used(served: Served) -> None:

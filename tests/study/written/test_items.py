@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from typing import Any, get_args
+from urllib.parse import urlencode
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pydantic import ValidationError
 
 from galley.study.scores import subscale_scores, wrong_items
 from galley.study.visit.draft import item_order
@@ -40,6 +42,61 @@ def answer(item: dict[str, Any], form: dict[str, list[str]]) -> tuple[Any, str |
 )
 def test_points_are_stored_as_numbers(item: dict[str, Any], given: str, wanted: object) -> None:
     assert answer(item, {"q0": [given]}) == (wanted, None)
+
+
+@pytest.mark.parametrize("kind", ["likert", "semantic_differential", "comparison"])
+@pytest.mark.parametrize(("start", "scale"), [(0, 11), (-3, 7), (1, 7), (10, 2)])
+def test_f24_a_scale_begins_where_its_file_says(kind: str, start: int, scale: int) -> None:
+    item = {
+        "kind": kind,
+        **SCALE,
+        "scale": scale,
+        "start": start,
+        "labels": ["word"] * (scale - 1) + ["last"],
+    }
+    last = start + scale - 1
+    one = made(item).items[0]
+    assert [answer(item, {"q0": [str(point)]})[0] for point in (start, last)] == [start, last]
+    for beside in (start - 1, last + 1, "", "1.0", f"+{last}"):
+        assert answer(item, {"q0": [str(beside)]})[0] is None
+    assert answer(item, {"q0": ["999"]})[1] == f"Please choose a point from {start} to {last}."
+    assert one.label_of(last) == "last"
+    if kind == "comparison":
+        assert [one.preference(point) for point in (start, last)] == [(1 - scale) / 2, (scale - 1) / 2]
+    else:
+        back = made({**item, "reversed": True, "subscale": "s"}).items[0]
+        assert [back.scored(point) for point in (start, last)] == [last, start]
+
+
+def test_f24_an_expected_point_lies_on_the_scale() -> None:
+    zero = {"kind": "likert", **SCALE, "scale": 11, "start": 0}
+    assert made({**zero, "expected": 0}).items[0].passed(0) is True
+    with pytest.raises(ValidationError, match="11 is not on the scale"):
+        made({**zero, "expected": 11})
+
+
+ASTRAL, LINES = "\N{GRINNING FACE}", "\r\n"
+MANY = [{"value": f"{'v' * 36}{n:02}", "label": "?"} for n in range(50)]
+
+
+@pytest.mark.parametrize(
+    ("item", "sent"),
+    [
+        ({"kind": "long_text", "max_length": 20000}, [("q0", "\N{CJK UNIFIED IDEOGRAPH-4E00}" * 20000)]),
+        ({"kind": "long_text", "max_length": 20000}, [("q0", ASTRAL * 10000)]),  # maxlength counts halves
+        ({"kind": "long_text", "max_length": 1000}, [("q0", LINES * 500)]),
+        ({"kind": "short_text"}, [("q0", "\N{LATIN SMALL LETTER E WITH ACUTE}" * 200)]),
+        ({"kind": "multiple_choice", "options": MANY}, [("q0", one["value"]) for one in MANY]),
+        ({"kind": "ranking", "options": MANY[:20]}, [(f"q0.{one['value']}", "20") for one in MANY[:20]]),
+        ({"kind": "number", "min": 0, "max": 1}, [("q0", "1" * 20)]),
+    ],
+)
+def test_f14_a_questionnaire_knows_its_largest_form(
+    item: dict[str, Any], sent: list[tuple[str, str]]
+) -> None:
+    most, fields = made(item).form_size
+    assert len(urlencode(sent)) <= most
+    assert len(sent) <= fields
 
 
 @pytest.mark.parametrize(

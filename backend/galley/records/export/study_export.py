@@ -296,6 +296,7 @@ def _response(step: Step, row: Mapping[str, Any], item: Item | None) -> dict[str
         "position": row["position"],
         "item": row["item"],
         **{name: shown.get(name) for name in ("kind", "text", "scale", "low_label", "high_label")},
+        "start": getattr(item, "start", None),
         "value": _joined(value),
         "label": None if item is None else item.label_of(value),
         "passed": row["passed"],

@@ -6,7 +6,7 @@ import asyncio
 import logging
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Final
 from urllib.parse import quote, urlencode
 
 import jinja2
@@ -59,6 +59,8 @@ ANSWERS_STAY = mark(
 NO_PAGE = mark("There is no page at this address. Please check that the link is complete.")
 FOREIGN = mark("This form was sent from another site, so it was not used.")
 UNREADABLE = mark("This form could not be read, so nothing was changed.")
+TOO_LARGE: Final = 413
+TOO_LONG = mark("Your answers are longer than this page takes. Please answer again in fewer words.")
 UNTESTED = mark(
     "This test link is not good any more. Please make a new one on the study's page for researchers."
 )
@@ -271,10 +273,12 @@ class Pages:
         if visit is None:
             return await self._no_visit(token)
         language = visit.row.language
+        asked = questionnaire_of(visit) if visit.active else None
         try:
-            form = await read_form(request, self._max_form_bytes)
+            form = await read_form(request, self._max_form_bytes, asked.form_size if asked else (0, 0))
         except FormError as error:
-            return self.plain(error.status, NOT_USED, UNREADABLE, language)
+            told = TOO_LONG if error.status == TOO_LARGE else UNREADABLE
+            return self.plain(error.status, NOT_USED, told, language)
         step = visit.step
         on = RedirectResponse(visit.url, 303, NEVER_CACHED)
         if not visit.active or form.get("step", [""])[0] != step.id:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import unicodedata
 from collections.abc import Callable, Mapping, Sequence
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Final
 
 from pydantic import Field
 
@@ -15,6 +15,9 @@ from galley.translations import mark
 Answer = int | float | str | list[str] | None
 Say = Callable[[str], str]
 """Translates a message before its `{places}` are filled in, as gettext does."""
+
+BYTES_PER_CHARACTER: Final = 9
+"""What a character takes at most of what browsers send: three bytes of UTF-8, each as %XX."""
 
 ItemId = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=40)]
 
@@ -71,6 +74,10 @@ class BaseItem(FileModel):
     """Shown beside it when a quiz is answered wrongly."""
     subscale: Annotated[str, Field(pattern=r"^[a-z0-9_-]*$", max_length=40)] = ""
     """The name under which answers to several items are averaged."""
+
+    def longest_fields(self) -> list[tuple[str, int]]:
+        """(name, most characters) of every field that a form may hold for it."""
+        return [(self.id, 40)]
 
     def given(self, form: Mapping[str, Sequence[str]]) -> list[str]:
         """The cleaned values of its fields in a form; a list without any text if it was left blank."""

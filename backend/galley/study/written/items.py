@@ -28,15 +28,17 @@ STEP_TOLERANCE: Final = 1e-6
 
 class _Scale(BaseItem):
     drawn_as = "scale"
-    stored = "1 to `scale`"
+    stored = "the number of the point: 1 to `scale`, or as many from `start` on"
     radio_group = True
     numeric = True
     missing = mark("Please choose a point on the scale.")
 
     scale: int = Field(7, ge=2, le=101)
     """How many points the scale has."""
+    start: int = Field(1, ge=-100, le=100)
+    """The number of the point at the low end: 0 with a `scale` of 11 is 0 to 10, -3 with 7 is -3 to +3."""
     low_label: Text
-    """The words at the low end, point 1."""
+    """The words at the low end."""
     high_label: Text
     """The words at the high end."""
     labels: tuple[Words, ...] = ()
@@ -49,15 +51,21 @@ class _Scale(BaseItem):
             raise faults([(("labels",), told, f"write {self.scale} labels, or none")])
         return self
 
+    @property
+    def points(self) -> range:
+        """The numbers of its points, the low end first."""
+        return range(self.start, self.start + self.scale)
+
     def answer(self, given: Sequence[str], say: Say) -> int:
-        """The point, 1 at the low end."""
-        if given[0] not in map(str, range(1, self.scale + 1)):
-            raise ValueError(say("Please choose a point from 1 to {most}.").format(most=self.scale))
+        """The number of the point."""
+        if given[0] not in map(str, self.points):
+            told = say("Please choose a point from {least} to {most}.")
+            raise ValueError(told.format(least=self.points[0], most=self.points[-1]))
         return int(given[0])
 
     def label_of(self, answer: Answer) -> str | None:
         """The words at a point, where every point has words."""
-        return self.labels[answer - 1] if self.labels and isinstance(answer, int) else None
+        return self.labels[self.points.index(answer)] if self.labels and isinstance(answer, int) else None
 
 
 class _Rating(_Scale):
@@ -70,17 +78,18 @@ class _Rating(_Scale):
 
     @model_validator(mode="after")
     def _expected_is_on_the_scale(self) -> Self:
-        if self.expected is not None and not 1 <= self.expected <= self.scale:
-            raise faults([(("expected",), f"{self.expected} is not on the scale", f"use 1 to {self.scale}")])
+        if self.expected is not None and self.expected not in self.points:
+            fix = f"use {self.points[0]} to {self.points[-1]}"
+            raise faults([(("expected",), f"{self.expected} is not on the scale", fix)])
         return self
 
     def scored(self, answer: Answer) -> float | None:
         """The point, counted from the other end if the item is reversed."""
-        return turned_round(answer, 1, self.scale, reversed_=self.reversed)
+        return turned_round(answer, self.points[0], self.points[-1], reversed_=self.reversed)
 
 
 class Likert(_Rating):
-    """Agreement with a statement, from 1 (low_label) to `scale` (high_label); `expected` makes it a check."""
+    """Agreement with a statement, from `low_label` to `high_label`; `expected` makes it a check."""
 
     kind: Literal["likert"]
     style: Literal["radio", "stars"] = "radio"
@@ -88,20 +97,20 @@ class Likert(_Rating):
 
 
 class SemanticDifferential(_Rating):
-    """A place between two opposite words, such as *dull* and *clever*, from 1 to `scale`."""
+    """A place between two opposite words, such as *dull* and *clever*."""
 
     kind: Literal["semantic_differential"]
 
 
 class Comparison(_Scale):
-    """Preference between two partners, from 1 (strongly the first) to `scale` (strongly the second).
+    """Preference between two partners, from strongly the first (the low end) to strongly the second.
 
     The item kind is `comparison`, for comparison stages only.
     """
 
     compares = True
     stored = (
-        "1 (strongly the first partner) to `scale` (strongly the second), and the signed preference, "
+        "the number of the point, the lowest strongly the first partner, and the signed preference, "
         "from below 0 for the first to above 0 for the second"
     )
 
@@ -109,7 +118,7 @@ class Comparison(_Scale):
 
     def preference(self, answer: Answer) -> float | None:
         """Points from the middle of the scale: -3 to 3 for a scale of 7; 0 is no preference."""
-        return answer - (self.scale + 1) / 2 if isinstance(answer, (int, float)) else None
+        return answer - sum(self.points) / self.scale if isinstance(answer, (int, float)) else None
 
 
 class _Choice(BaseItem):
@@ -134,6 +143,10 @@ class _Choice(BaseItem):
     def values(self) -> tuple[str, ...]:
         """What may be stored of each option, in the order of the file."""
         return tuple(option.value for option in self.options)
+
+    def longest_fields(self) -> list[tuple[str, int]]:
+        """One for each option."""
+        return [(self.id, len(value)) for value in self.values]
 
     def label_of(self, answer: Answer) -> str | None:
         """The words of the chosen options."""
@@ -223,6 +236,10 @@ class Ranking(_Choice):
     def field(self, value: str) -> str:
         """The form field that holds the place of one option, 1 for the first."""
         return f"{self.id}.{value}"
+
+    def longest_fields(self) -> list[tuple[str, int]]:
+        """The place of every option."""
+        return [(self.field(value), 2) for value in self.values]
 
     def given(self, form: Mapping[str, Sequence[str]]) -> list[str]:
         """The place of every option, blank where there is none or more than one."""
@@ -365,6 +382,10 @@ class Slider(_Amount):
 class _Words(BaseItem):
     stored = "the text"
     max_length: int
+
+    def longest_fields(self) -> list[tuple[str, int]]:
+        """The text; a line break is sent as two characters."""
+        return [(self.id, self.max_length)]
 
     def answer(self, given: Sequence[str], say: Say) -> str:
         """The text."""

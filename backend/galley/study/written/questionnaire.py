@@ -9,7 +9,7 @@ from typing import Any, Literal
 from pydantic import Field, field_validator
 
 from galley.files.reading import FileModel, Loaded, Loc, faults, load
-from galley.study.written.item_base import Answer, Say
+from galley.study.written.item_base import BYTES_PER_CHARACTER, Answer, Say
 from galley.study.written.items import Item
 from galley.study.written.languages import Text, Words
 
@@ -45,6 +45,13 @@ class Questionnaire(FileModel):
     def expected(self) -> dict[str, Any]:
         """The right answer of every item that has one."""
         return {item.id: item.right for item in self.items if item.right is not None}
+
+    @property
+    def form_size(self) -> tuple[int, int]:
+        """(bytes, fields) of the largest form that a browser may send of it."""
+        fields = [field for item in self.items for field in item.longest_fields()]
+        most = sum(len(name) + 2 + BYTES_PER_CHARACTER * characters for name, characters in fields)
+        return most, len(fields)
 
     def arranged(self, item_order: Sequence[str]) -> Questionnaire:
         """The same questionnaire with those of its items that have these ids, in this order."""
@@ -85,7 +92,7 @@ def validate_answers(
     """(answers, problems) of a submitted form; the answers count only if there are no problems.
 
     `form` maps a field name to its values as sent; names that are no item are ignored. Answers have every
-    item: a scale's point as int (1 is the low end), a choice as the option's value, several as a list in the
+    item: a scale's point as int (its number), a choice as the option's value, several as a list in the
     order of the file, a ranking as a list with the first place first, a number or slider as int or float,
     text without blanks around it, None for what was left blank or not asked. Problems map an item's id to
     what a participant should do, translated by `say`. Nothing is filled in: an untouched scale is a problem,
