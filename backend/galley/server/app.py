@@ -17,7 +17,7 @@ from galley.errors import GalleyError
 from galley.records import Store
 from galley.server.base_path import BasePath
 from galley.server.changed_files import kept_by
-from galley.server.clock import Clock
+from galley.server.clock import Clock, Following, WakingClock
 from galley.server.content import Content
 from galley.server.garbage_collection import collect_between_rounds, few_collections
 from galley.server.headers import HEADERS, SecureHeaders
@@ -50,12 +50,14 @@ AWAY_RETRY_S = "5"
 def create_app(content: Content, store: Store, settings: Settings, *, preview: bool = False) -> FastAPI:
     """The application that serves studies and keeps what happens in a store; with `preview` all are tests."""
     studies = content.studies
-    clock = Clock()
+    clock, rounds_clock = WakingClock(), Clock()
     thinking = Thinking(settings.think_window_ms / 1000.0)
     catalogues = Catalogues.load()
     has = kept_by(content.layouts, content.agents)
     visits = Visits(store, studies, clock, catalogues, has, preview=preview)
-    matches = Matches(store, visits, content.agents, content.layouts, thinking, clock, settings.reached_at)
+    matches = Matches(
+        store, visits, content.agents, content.layouts, thinking, rounds_clock, settings.reached_at
+    )
     frontend = frontend_folder()
     environment = translated_templates(str(frontend / "templates"), catalogues)
     pages = Pages(
@@ -78,18 +80,22 @@ def create_app(content: Content, store: Store, settings: Settings, *, preview: b
     )
 
     time_limits = TimeLimits(store, studies, visits, matches, clock)
+    following = Following(store, clock, rounds_clock, matches.playing)
 
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
+        await following.look()
         thinking.start()
         with few_collections():
             watching = asyncio.create_task(time_limits.watch())
             collecting = asyncio.create_task(collect_between_rounds(matches.playing))
+            following_on = asyncio.create_task(following.watch())
             try:
                 yield
             finally:
                 watching.cancel()
                 collecting.cancel()
+                following_on.cancel()
                 await matches.stop()
                 await asyncio.wrap_future(store.flush())
                 thinking.stop()

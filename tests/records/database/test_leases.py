@@ -9,6 +9,7 @@ import pytest
 
 from galley.errors import GalleyError
 from galley.records import ClockRow, KeyRow, Lease, LeaseLost, Store
+from galley.records.reading.overdue import wall_time
 from tests.postgres import Postgres
 from tests.records import databases
 from tests.records.helpers import START_MS, begin, joint_actions, one_soup, open_round, tick_rows
@@ -146,3 +147,14 @@ def test_keys_and_pings_are_signs_of_life_of_their_seat(store: Store) -> None:
     after = stored_visit(store, visit.token)
     assert after is not None
     assert after.last_seen_ms == START_MS + 30_000
+
+
+def test_a15_two_servers_measure_one_clock_though_their_machines_differ(
+    pair: tuple[Store, Store], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first, second = pair
+    one = first.read(wall_time).result()
+    real = time.time
+    monkeypatch.setattr(time, "time", lambda: real() - 3600)
+    other = second.read(wall_time).result()
+    assert other.wall_ms - one.wall_ms == pytest.approx((other.at_s - one.at_s) * 1000, abs=5000)

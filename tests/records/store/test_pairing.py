@@ -96,3 +96,18 @@ def test_an_erased_visit_waits_no_more(store: Store) -> None:
         lambda connection: connection.execute(VISITS.delete().where(VISITS.c.id == visit.id))
     ).result()
     assert waiting(store) == []
+
+
+def test_a15_who_asked_before_the_clock_was_set_back_is_not_taken_for_somebody_who_waits(
+    store: Store,
+) -> None:
+    gone, one, two = (begin(store) for _ in range(3))
+    assert wait(store, gone) is None
+    hour_ms = 3_600_000
+    later = update(WAITING).values(
+        since_ms=WAITING.c.since_ms + hour_ms, asked_ms=WAITING.c.asked_ms + hour_ms
+    )
+    store.write(lambda connection: connection.execute(later)).result()
+    assert wait(store, one) is None, "nobody asked within the last minute"
+    assert wait(store, two) is not None
+    assert seats(store, one) == [one.id, two.id]

@@ -122,7 +122,7 @@ PARTICIPANTS: Final = Sheet(
         Field("begun_utc", "time", str(VISITS.c.created_ms.doc)),
         Field("ended_utc", "time", str(VISITS.c.ended_ms.doc)),
         Field("last_seen_utc", "time", str(VISITS.c.last_seen_ms.doc)),
-        Field("duration_s", "number", "seconds from begin to end"),
+        Field("duration_s", "number", "seconds from begin to end; none if the clock was set back"),
         Field("hidden_s", "number", "seconds that the page was hidden behind another tab or window"),
         Field("rounds_finished", "whole number", "rounds played to their end, tutorials left out"),
         Field("rounds_abandoned", "whole number", "rounds left before their end, tutorials left out"),
@@ -145,7 +145,7 @@ STAGES_SHEET: Final = Sheet(
         Field("title", "text", "title of its page"),
         Field("entered_utc", "time", str(STAGES.c.entered_ms.doc)),
         Field("left_utc", "time", str(STAGES.c.left_ms.doc)),
-        Field("duration_s", "number", "seconds from entering to leaving"),
+        Field("duration_s", "number", "seconds from entering to leaving; none if the clock was set back"),
         _as_in(STAGES.c.views, "whole number"),
     ),
 )
@@ -386,7 +386,7 @@ ABSENCES_SHEET: Final = Sheet(
         *_STEP,
         Field("started_utc", "time", str(ABSENCES.c.started_ms.doc)),
         Field("ended_utc", "time", str(ABSENCES.c.ended_ms.doc)),
-        Field("duration_s", "number", "seconds in between"),
+        Field("duration_s", "number", "seconds in between; none if the clock was set back"),
     ),
 )
 
@@ -420,7 +420,7 @@ WIDE: Final = Sheet(
         *_WHO,
         _as_in(VISITS.c.status, "text"),
         _as_in(VISITS.c.language, "text"),
-        Field("duration_s", "number", "seconds from begin to end"),
+        Field("duration_s", "number", "seconds from begin to end; none if the clock was set back"),
     ),
     (
         Field("condition.FACTOR", "text", "level of a factor that varies between participants"),

@@ -100,7 +100,7 @@ class RoundExport:
         mine = (ping for ping in self.clocks if ping["seat"] == self.human.seat)
         rtts = [ping["rtt_ms"] for ping in mine if ping["rtt_ms"] is not None]
         other = row.stand_ins[0] if row.stand_ins else None
-        paused = [p["ended_ms"] - p["started_ms"] for p in self.pauses if p["ended_ms"] is not None]
+        paused = [queries.seconds_between(p["started_ms"], p["ended_ms"]) or 0.0 for p in self.pauses]
         return {
             **self.at,
             "tutorial": self.step.tutorial,
@@ -128,7 +128,7 @@ class RoundExport:
             "started_utc": self.ticks[0]["deadline_ms"] if self.ticks else None,
             "ended_utc": row.ended_ms,
             "pauses": len(self.pauses),
-            "paused_s": sum(paused) / 1000,
+            "paused_s": sum(paused),
             "late_ticks": sum(tick["late"] for tick in self.ticks),
             "fault_ticks": sum(tick["fault"] is not None for tick in self.ticks),
             "lateness_median_ms": _quantile(lateness, 0.5),

@@ -141,7 +141,7 @@ class _Visit:
         means = self._responses()
         self._small_sheets()
         who = {**self.who, "status": self.visit.status, "language": self.visit.language}
-        duration_s = _seconds(self.visit.created_ms, self.visit.ended_ms)
+        duration_s = queries.seconds_between(self.visit.created_ms, self.visit.ended_ms)
         self.files[WIDE.name].write({**who, "duration_s": duration_s, **self._wide(means)})
 
     def _wide(self, means: Mapping[str, Mapping[str, float | None]]) -> dict[str, Any]:
@@ -157,11 +157,13 @@ class _Visit:
                 times = {"sent_utc": row.get("at_ms"), "written_utc": row.get("at_ms")}
                 span = {"started_utc": row.get("started_ms"), "ended_utc": row.get("ended_ms")}
                 if "started_ms" in row:
-                    span["duration_s"] = _seconds(row["started_ms"], row["ended_ms"])
+                    span["duration_s"] = queries.seconds_between(row["started_ms"], row["ended_ms"])
                 self.files[sheet.name].write({**self.who, **row, **at, **times, **span})
 
     def _hidden_s(self) -> float:
-        gone = select(func.sum(ABSENCES.c.ended_ms - ABSENCES.c.started_ms))
+        gone = select(func.sum(ABSENCES.c.ended_ms - ABSENCES.c.started_ms)).where(
+            ABSENCES.c.ended_ms >= ABSENCES.c.started_ms
+        )
         hidden_ms = self.connection.execute(gone.where(ABSENCES.c.visit_id == self.visit.id)).scalar()
         return float(hidden_ms or 0) / 1000
 
@@ -207,7 +209,7 @@ class _Visit:
                 "link_params": visit.link_params,
                 "begun_utc": visit.created_ms,
                 "ended_utc": visit.ended_ms,
-                "duration_s": _seconds(visit.created_ms, visit.ended_ms),
+                "duration_s": queries.seconds_between(visit.created_ms, visit.ended_ms),
                 "rounds_finished": statuses.count("finished"),
                 "rounds_abandoned": statuses.count("abandoned"),
                 **earned(self.told.values()),
@@ -228,7 +230,7 @@ class _Visit:
                     "title": step.title,
                     "entered_utc": row["entered_ms"],
                     "left_utc": row["left_ms"],
-                    "duration_s": _seconds(row["entered_ms"], row["left_ms"]),
+                    "duration_s": queries.seconds_between(row["entered_ms"], row["left_ms"]),
                     "views": row["views"],
                 }
             )
@@ -311,7 +313,3 @@ def _response(step: Step, row: Mapping[str, Any], item: Item | None) -> dict[str
 
 def _joined(value: Any) -> Any:
     return " | ".join(map(str, value)) if isinstance(value, list) else value
-
-
-def _seconds(start_ms: int, end_ms: int | None) -> float | None:
-    return None if end_ms is None else (end_ms - start_ms) / 1000

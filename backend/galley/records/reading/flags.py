@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Final
 
-from sqlalchemy import ColumnElement, Connection, Select, func, select
+from sqlalchemy import ColumnElement, Connection, Select, func, select, true
 
-from galley.records.database.tables import ABSENCES, RESPONSES, ROUNDS, SEATS, VISITS
+from galley.records.database.tables import ABSENCES, RESPONSES, ROUNDS, SEATS, STAGES, VISITS
 from galley.study.visit.plan import Plan
 from galley.study.written.recruitment import is_placeholder
 
@@ -25,6 +25,7 @@ FLAGS: Final = {
     "failed_checks": "an attention check was not answered as expected",
     "no_id": "the link held a placeholder where the recruiter should have put a person's id",
     "interrupted": "the visit ended early because a file that it needs was changed or removed",
+    "clock_set_back": "the clock was set back while the visit ran: some of its durations are missing",
     "slow_client": "in some round, half of all round trips took more than 300 ms",
 }
 """Every kind of flag and what it means."""
@@ -47,7 +48,7 @@ def flags(
     if not tests:
         these = these & ~VISITS.c.test
     found: dict[int, list[Flag]] = defaultdict(list)
-    for rule in (_late, _hidden, _failed, _unnamed, _interrupted, _slow):
+    for rule in (_late, _hidden, _failed, _unnamed, _interrupted, _set_back, _slow):
         for visit, flag in rule(connection, these):
             found[visit].append(flag)
     return {visit: tuple(of_visit) for visit, of_visit in sorted(found.items())}
@@ -70,6 +71,7 @@ def _late(connection: Connection, these: ColumnElement[bool]) -> Found:
 
 def _hidden(connection: Connection, these: ColumnElement[bool]) -> Found:
     query = _of(these, ABSENCES, func.sum(ABSENCES.c.ended_ms - ABSENCES.c.started_ms), func.count())
+    query = query.where(func.coalesce(ABSENCES.c.ended_ms >= ABSENCES.c.started_ms, true()))
     for visit, hidden_ms, times in connection.execute(query.group_by(VISITS.c.id)):
         seconds = float(hidden_ms or 0) / 1000
         if seconds > HIDDEN_S:
@@ -103,6 +105,17 @@ def _interrupted(connection: Connection, these: ColumnElement[bool]) -> Found:
     query = select(VISITS.c.id).where(these, VISITS.c.status == "interrupted")
     for visit in connection.execute(query).scalars():
         yield visit, Flag("interrupted", 1.0, "a file that it needs was changed or removed")
+
+
+def _set_back(connection: Connection, these: ColumnElement[bool]) -> Found:
+    spans = (
+        select(VISITS.c.id).where(these, VISITS.c.ended_ms < VISITS.c.created_ms),
+        _of(these, STAGES).where(STAGES.c.left_ms < STAGES.c.entered_ms),
+        _of(these, ABSENCES).where(ABSENCES.c.ended_ms < ABSENCES.c.started_ms),
+    )
+    counts = Counter(visit for query in spans for visit in connection.execute(query).scalars())
+    for visit, count in counts.items():
+        yield visit, Flag("clock_set_back", float(count), f"{count} durations are missing")
 
 
 def _slow(connection: Connection, these: ColumnElement[bool]) -> Found:

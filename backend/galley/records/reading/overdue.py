@@ -1,10 +1,12 @@
-"""Visits under way: where they are in their plans, and those that go on though their time has passed."""
+"""Visits under way: where they are in their plans, what time it is for them, and whose time has passed."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
+from dataclasses import dataclass
 
-from sqlalchemy import Connection, exists, or_, select
+from sqlalchemy import Connection, exists, func, or_, select
 
 from galley.records.database import leases
 from galley.records.database.tables import LEASES, ROUNDS, SEATS, VISITS
@@ -17,6 +19,29 @@ def under_way(connection: Connection) -> list[UnderWay]:
     """Every active visit of every study."""
     query = select(VISITS.c.study, VISITS.c.plan_json, VISITS.c.step_index).where(VISITS.c.status == "active")
     return [(study, plan, int(index)) for study, plan, index in connection.execute(query)]
+
+
+@dataclass(frozen=True, slots=True)
+class WallTime:
+    """The wall clock (ms) that all servers on a database share, at an instant of monotonic seconds."""
+
+    wall_ms: float
+    at_s: float
+
+
+def wall_time(connection: Connection) -> WallTime:
+    """What time it is."""
+    connection.execute(select(1))  # opening the connection is not measured with
+    before_s = time.monotonic()
+    wall_ms = leases.now_ms(connection)
+    return WallTime(wall_ms, (before_s + time.monotonic()) / 2)
+
+
+def latest_ms(connection: Connection) -> float | None:
+    """The latest time that a visit under way has; None while there is none."""
+    query = select(func.max(VISITS.c.last_seen_ms)).where(VISITS.c.status == "active")
+    latest = connection.execute(query).scalar()
+    return None if latest is None else float(latest)
 
 
 def overdue_tokens(connection: Connection, begun_before: Mapping[str, float], owner: str) -> list[str]:

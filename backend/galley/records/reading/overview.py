@@ -16,6 +16,7 @@ from galley.records.reading.flags import Flag, flags
 from galley.records.reading.round_replay import nobody
 from galley.records.reading.timeline import TimelineEntry, timeline
 from galley.records.store.arrivals import slots
+from galley.records.store.queries import seconds_between
 from galley.study.visit.plan import Plan
 
 __all__ = [
@@ -184,8 +185,9 @@ def stages(connection: Connection, study: str) -> tuple[StageCount, ...]:
     for visit_id, step_id, entered_ms, left_ms, status in connection.execute(query):
         entered[step_id] += 1
         last[visit_id] = (step_id, status)
-        if left_ms is not None:
-            seconds[step_id].append((left_ms - entered_ms) / 1000)
+        took_s = seconds_between(entered_ms, left_ms)
+        if took_s is not None:
+            seconds[step_id].append(took_s)
     at_last = Counter(last.values())
     here = Counter({step: count for (step, status), count in at_last.items() if status == "active"})
     dropped: Counter[str] = Counter()

@@ -19,6 +19,7 @@ from galley.records.database.tables import (
     STAND_INS,
     VISITS,
 )
+from galley.records.store.queries import seconds_between
 
 # What comes first of what happened in the same millisecond.
 ORDER = (
@@ -82,9 +83,7 @@ def _rounds(connection: Connection, visit_id: int) -> Iterator[TimelineEntry]:
             score = "" if row.score is None else f", score {row.score}"
             yield TimelineEntry(row.ended_ms, "round_over", f"round {row.round_no} {row.status}{score}", *at)
         for pause in connection.execute(select(PAUSES).where(PAUSES.c.round_id == row.id)):
-            lasted = (
-                "" if pause.ended_ms is None else f" for {(pause.ended_ms - pause.started_ms) / 1000:.1f} s"
-            )
+            lasted = _lasted(pause.started_ms, pause.ended_ms)
             words = f"paused at tick {pause.tick}{lasted}: {pause.reason}"
             yield TimelineEntry(round(pause.started_ms), "paused", words, *at)
         for other in connection.execute(select(STAND_INS).where(STAND_INS.c.round_id == row.id)):
@@ -97,10 +96,15 @@ def _others(connection: Connection, visit_id: int) -> Iterator[TimelineEntry]:
         words = f"attempt {row.attempt} failed: {', '.join(row.wrong)}"
         yield TimelineEntry(row.at_ms, "attempt", words, row.step_id)
     for row in connection.execute(_of(ABSENCES, visit_id)):
-        lasted = "" if row.ended_ms is None else f" for {(row.ended_ms - row.started_ms) / 1000:.1f} s"
+        lasted = _lasted(row.started_ms, row.ended_ms)
         yield TimelineEntry(row.started_ms, "hidden", f"page hidden{lasted}", row.step_id)
     for row in connection.execute(_of(NOTES, visit_id)):
         yield TimelineEntry(row.at_ms, "note", f"{row.author}: {row.text}")
+
+
+def _lasted(started_ms: float, ended_ms: float | None) -> str:
+    seconds = seconds_between(started_ms, ended_ms)
+    return "" if seconds is None else f" for {seconds:.1f} s"
 
 
 def _of(table: Table, visit_id: int) -> Select[Any]:

@@ -41,7 +41,7 @@ def wait(connection: Connection, waits: Waits, gone_s: float, together: Together
     if mine.status != "active" or mine.step_index != waits.step_index:
         _forget(connection, waits.visit_id)
         return None
-    found = _longest(connection, waits, mine, now_ms - round(gone_s * 1000))
+    found = _longest(connection, waits, mine, now_ms - round(gone_s * 1000), now_ms)
     if found is None:
         return None
     other_since_ms, other = found
@@ -69,7 +69,10 @@ def _ask(connection: Connection, waits: Waits, now_ms: int, gone_ms: int) -> int
     """Since when the visit waits; who comes back after long waits from now on."""
     here = WAITING.c.visit_id == waits.visit_id
     before = connection.execute(select(WAITING).where(here)).mappings().one_or_none()
-    goes_on = before is not None and before["step_id"] == waits.step_id and before["asked_ms"] > gone_ms
+    # Who asked later than now did so before the clock was set back.
+    goes_on = (
+        before is not None and before["step_id"] == waits.step_id and gone_ms < before["asked_ms"] <= now_ms
+    )
     since_ms = int(before["since_ms"]) if before is not None and goes_on else now_ms
     row = {**asdict(waits), "since_ms": since_ms, "asked_ms": now_ms}
     new = insert_into(connection.engine, WAITING).values(**row)
@@ -78,7 +81,7 @@ def _ask(connection: Connection, waits: Waits, now_ms: int, gone_ms: int) -> int
 
 
 def _longest(
-    connection: Connection, waits: Waits, mine: VisitRow, gone_ms: int
+    connection: Connection, waits: Waits, mine: VisitRow, gone_ms: int, now_ms: int
 ) -> tuple[int, VisitRow] | None:
     """Who waited longest of those that fit, and since when."""
     fits = (
@@ -92,7 +95,8 @@ def _longest(
     query = (
         select(WAITING.c.since_ms, VISITS)
         .join(VISITS, VISITS.c.id == WAITING.c.visit_id)
-        .where(fits, WAITING.c.pairing == waits.pairing, WAITING.c.asked_ms > gone_ms)
+        .where(fits, WAITING.c.pairing == waits.pairing)
+        .where(WAITING.c.asked_ms > gone_ms, WAITING.c.asked_ms <= now_ms)
         .order_by(WAITING.c.since_ms, VISITS.c.id)
     )
     found = connection.execute(query.limit(1)).mappings().one_or_none()

@@ -28,6 +28,11 @@ def studies(connection: Connection) -> tuple[str, ...]:
     return tuple(connection.execute(select(VISITS.c.study).distinct().order_by(VISITS.c.study)).scalars())
 
 
+def seconds_between(start_ms: float, end_ms: float | None) -> float | None:
+    """How long something took; None if it is not over, or the clock was set back in between."""
+    return None if end_ms is None or end_ms < start_ms else (end_ms - start_ms) / 1000
+
+
 def must_know(connection: Connection, database: str, study: str) -> None:
     """Make sure that somebody visited the study.
 
