@@ -1,4 +1,4 @@
-"""The folder that holds a lab's layouts, agents, questionnaires, texts and studies, reached by name."""
+"""The folder that holds a lab's layouts, agents, questionnaires, texts, studies and languages, by name."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Final, Literal, get_args
 from galley.errors import GalleyError
 from galley.names import name_fix
 
-Kind = Literal["layouts", "agents", "questionnaires", "texts", "studies", "invitations"]
+Kind = Literal["layouts", "agents", "questionnaires", "texts", "studies", "invitations", "catalogues"]
 KINDS: Final[tuple[Kind, ...]] = get_args(Kind)
 
 NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
@@ -22,6 +22,7 @@ _PLACES: Final[dict[Kind, tuple[str, str]]] = {
     "texts": ("questionnaires/texts", ".md"),
     "studies": ("studies", ".yaml"),
     "invitations": ("invitations", ".txt"),
+    "catalogues": ("locale", ".po"),
 }
 
 

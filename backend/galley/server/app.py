@@ -32,7 +32,7 @@ from galley.server.rounds.play_socket import Play
 from galley.server.rounds.thinking import Thinking
 from galley.server.settings import Settings
 from galley.server.templates import translated_templates
-from galley.translations import Catalogues, mark
+from galley.translations import mark
 from galley.workspace import frontend_folder
 
 LOG = logging.getLogger(__name__)
@@ -52,14 +52,13 @@ def create_app(content: Content, store: Store, settings: Settings, *, preview: b
     studies = content.studies
     clock, rounds_clock = WakingClock(), Clock()
     thinking = Thinking(settings.think_window_ms / 1000.0)
-    catalogues = Catalogues.load()
     has = kept_by(content.layouts, content.agents)
-    visits = Visits(store, studies, clock, catalogues, has, preview=preview)
+    visits = Visits(store, studies, clock, content.catalogues, has, preview=preview)
     matches = Matches(
         store, visits, content.agents, content.layouts, thinking, rounds_clock, settings.reached_at
     )
     frontend = frontend_folder()
-    environment = translated_templates(str(frontend / "templates"), catalogues)
+    environment = translated_templates(str(frontend / "templates"), content.catalogues)
     pages = Pages(
         studies,
         visits,
@@ -118,19 +117,21 @@ def create_app(content: Content, store: Store, settings: Settings, *, preview: b
     app.add_middleware(SecureHeaders, framed_by=settings.framed_by)
     app.add_middleware(BasePath, base=settings.base_path)
 
-    async def not_here(_request: Request, error: Exception) -> Response:
+    async def not_here(request: Request, error: Exception) -> Response:
         status = error.status_code if isinstance(error, HTTPException) else 404
-        return pages.plain(status, NOT_FOUND if status == 404 else NOT_POSSIBLE, NO_PAGE)
+        return pages.plain(
+            status, NOT_FOUND if status == 404 else NOT_POSSIBLE, NO_PAGE, pages.spoken_to(request)
+        )
 
-    async def away(_request: Request, error: Exception) -> Response:
+    async def away(request: Request, error: Exception) -> Response:
         LOG.error("a page could not be served: %s", error)
-        response = pages.plain(503, WRONG, BROKEN)
+        response = pages.plain(503, WRONG, BROKEN, pages.spoken_to(request))
         response.headers["retry-after"] = AWAY_RETRY_S
         return response
 
     async def broken(request: Request, _error: Exception) -> Response:
         await pages.tell_broken(request.url.path)
-        response = pages.plain(500, WRONG, BROKEN)
+        response = pages.plain(500, WRONG, BROKEN, pages.spoken_to(request))
         # This page is made outside of the middleware.
         response.headers.update(HEADERS)
         return response

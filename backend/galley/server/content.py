@@ -19,6 +19,7 @@ from galley.study.stages.round_step import RoundStep
 from galley.study.study import Study, load_study
 from galley.study.visit.condition_slots import cells
 from galley.study.visit.plan import plan_visit, visit_seed
+from galley.translations import Catalogues
 from galley.workspace import Workspace
 
 REHEARSED_TICKS = 3
@@ -29,11 +30,12 @@ REHEARSED_PER_CELL = 8
 
 @dataclass(frozen=True, slots=True)
 class Content:
-    """Studies by name, layouts by name and alias, and the agents that may be met in them."""
+    """Studies by name, layouts by name and alias, the agents that may be met in them, and the languages."""
 
     studies: Mapping[str, Study]
     layouts: Mapping[str, Layout]
     agents: Catalogue
+    catalogues: Catalogues
 
 
 def load_content(workspace: Workspace, only: str = "") -> Content:
@@ -46,7 +48,8 @@ def load_content(workspace: Workspace, only: str = "") -> Content:
         GalleyError: there is no study, or an agent cannot play where a study lets it.
         InvalidFiles: all that is wrong with a file that a study needs.
     """
-    content = Content(_studies(workspace, only), load_layouts(workspace), Catalogue(workspace))
+    studies, catalogues = _studies(workspace, only), Catalogues.load(workspace.folder("catalogues"))
+    content = Content(studies, load_layouts(workspace), Catalogue(workspace), catalogues)
     warm()
     _rehearse(content.studies, content.layouts, content.agents)
     return content

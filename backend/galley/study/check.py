@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from galley.errors import InvalidFiles, Problem
 from galley.study.describe import describe
 from galley.study.study import known_layouts_of, load_study
+from galley.study.written.named_files import catalogue_problems
 from galley.study.written.questionnaire import load_questionnaire
 from galley.study.written.recruitment import load_invitations
 from galley.study.written.texts import load_text
@@ -29,8 +30,8 @@ def check_study(workspace: Workspace, name: str) -> list[Problem]:
 
 
 def check_workspace(workspace: Workspace) -> list[Problem]:
-    """All problems of layouts, questionnaires, texts and studies, named or not, each once and in order."""
-    problems = list(_misplaced(workspace))
+    """All problems of a workspace's files, agents aside, named or not: each once and in order."""
+    problems = [*_misplaced(workspace), *catalogue_problems(workspace)]
     layouts, _ = known_layouts_of(workspace, problems)
     grids = {name: layout.grid for name, layout in layouts.items()} or None
     for name in workspace.names("questionnaires"):
@@ -70,6 +71,10 @@ def _misplaced(workspace: Workspace) -> Iterator[Problem]:
             continue
         suffix = workspace.suffix(kind)
         for path in sorted(folder.iterdir()):
+            if kind == "catalogues" and path.is_dir() and any(path.rglob("*.po")):
+                shown = workspace.shown(path)
+                fix = f"move it to {workspace.shown(folder)}/{path.name}.po"
+                yield Problem(shown, None, "catalogues in folders of their own are not read", fix)
             if path.is_dir() or path.name.startswith("."):
                 continue
             shown = workspace.shown(path)

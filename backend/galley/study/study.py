@@ -13,7 +13,12 @@ from galley.outcomes import TurnedAway, VisitOutcome
 from galley.study.estimate import Ranges, in_figures, ranges
 from galley.study.visit.steps import QuestionsStep
 from galley.study.written.crosscheck import agent_problems, kitchen_problems, questionnaire_problems
-from galley.study.written.named_files import content_sha256, known_layouts_of, text_file
+from galley.study.written.named_files import (
+    catalogue_problems,
+    content_sha256,
+    known_layouts_of,
+    text_file,
+)
 from galley.study.written.questionnaire import Questionnaire, load_questionnaire
 from galley.study.written.recruitment import Ending, filled, kept, load_invitations
 from galley.study.written.study_file import StudyFile, names_of
@@ -37,8 +42,9 @@ class Quoted:
 class Study:
     """A validated study in one of its languages; `layouts` maps the names used in the file (aliases too).
 
-    `sha256` covers the study file and every questionnaire, text and layout file that it names, in every
-    language; agents have hashes of their own, and invitations may be added while a study runs.
+    `sha256` covers the study file, every questionnaire, text and layout file that it names, in every
+    language, and the workspace's catalogues of these languages; agents have hashes of their own, and
+    invitations may be added while a study runs.
     """
 
     name: str
@@ -139,6 +145,7 @@ def load_study(workspace: Workspace, name: str) -> Study:
         loaded = document.validated(StudyFile, context)
     except InvalidFiles as invalid:
         raise InvalidFiles([*problems, *invalid.problems]) from None
+    problems += catalogue_problems(workspace)
     problems += agent_problems(workspace, loaded, layouts)
     problems += kitchen_problems(loaded, layouts)
     invitations = _invitations(workspace, loaded.value, problems)

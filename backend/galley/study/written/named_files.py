@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -11,6 +12,7 @@ from galley.errors import InvalidFiles, Problem
 from galley.kitchen import Layout
 from galley.kitchen.layout_file import load_layout, load_layouts
 from galley.study.written.study_file import StudyFile, names_of
+from galley.translations import Catalogues
 from galley.workspace import Workspace
 
 
@@ -33,6 +35,17 @@ def _good_layouts(workspace: Workspace) -> Iterator[tuple[str, Layout]]:
             yield from ((called, layout) for called in (*layout.aliases, name))
 
 
+def catalogue_problems(workspace: Workspace) -> list[Problem]:
+    """What is wrong with the workspace's own catalogues."""
+    folder = workspace.folder("catalogues")
+    try:
+        if folder.is_dir():
+            Catalogues.load(folder)
+    except InvalidFiles as invalid:
+        return list(invalid.problems)
+    return []
+
+
 def text_file(workspace: Workspace, name: str, language: str, *, own: bool) -> Path | None:
     """`texts/NAME.LANGUAGE.md`, or in the study's `own` language `texts/NAME.md` if there is no such file."""
     known = workspace.names("texts")
@@ -42,13 +55,16 @@ def text_file(workspace: Workspace, name: str, language: str, *, own: bool) -> P
 
 
 def content_sha256(workspace: Workspace, name: str, config: StudyFile, layouts: Iterable[Layout]) -> str:
-    """The hash over names and contents of the study's file and of all it names, in all its languages."""
+    """The hash over the study's file, all it names and its languages' catalogues: names and contents."""
     texts = (
         text_file(workspace, text, language, own=language == config.languages[0])
         for text in names_of(config, "texts")
         for language in config.languages
     )
+    spoken = {code.partition("-")[0] for code in config.languages}
+    catalogues = workspace.folder("catalogues").glob("*.po")
     files = {
+        *(file for file in catalogues if re.split("[-_]", file.stem)[0] in spoken),
         workspace.find("studies", name),
         *(workspace.find("questionnaires", name) for name in names_of(config, "questionnaires")),
         *(text for text in texts if text is not None),
