@@ -154,7 +154,25 @@ def test_missing_words_are_told(tmp_path: Path, study: str, asked: str, zh: bool
         ("zh;q=x, pt", "pt-BR"),
         (",,;;q=1,zh" * 100, "zh"),
         ("*", "en"),
+        ("pt-PT", "pt-BR"),
+        ("pt-PT;q=0.9,zh;q=0.8", "pt-BR"),
+        ("-", "en"),
     ],
 )
 def test_the_browser_s_language_is_chosen_if_it_is_offered(accepted: str | None, wanted: str) -> None:
     assert choose_language(("en", "zh", "pt-BR"), accepted) == wanted
+
+
+@pytest.mark.parametrize(
+    ("accepted", "wanted"),
+    [
+        ("de-AT", "de-AT"),
+        ("de-CH", "de"),
+        ("de", "de"),
+        ("de-AT-1996", "de-AT"),
+        ("nl;q=0.5,de-at;q=0.4", "de-AT"),
+    ],
+)
+def test_d4_the_closest_of_a_language_s_regions_is_chosen(accepted: str, wanted: str) -> None:
+    """A sibling case: a study in German and in Austrian German."""
+    assert choose_language(("en", "de", "de-AT"), accepted) == wanted

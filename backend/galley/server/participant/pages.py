@@ -37,7 +37,7 @@ from galley.study.study import Study
 from galley.study.visit.happenings import Skipped
 from galley.study.written.languages import choose_language
 from galley.study.written.questionnaire import validate_answers
-from galley.translations import language_name, mark
+from galley.translations import SOURCE, language_name, mark
 
 LOG = logging.getLogger(__name__)
 MAX_LINK_PARAMS = 30
@@ -118,8 +118,9 @@ class Pages:
         query = _query(request)
         if len(self._studies) == 1:
             return RedirectResponse(f"/s/{next(iter(self._studies))}{query}", 303)
-        studies = [public_study(study) for study in self._studies.values()]
-        return self._page("studies.html", studies=studies, query=query)
+        spoken = (study.in_language(_language(study, request)) for study in self._studies.values())
+        studies = [public_study(study) for study in spoken]
+        return self._page("studies.html", studies=studies, query=query, language=self.spoken_to(request))
 
     async def health(self) -> Response:
         """Whether what happens reaches the database."""
@@ -132,7 +133,7 @@ class Pages:
         """What the study is and how long it takes, with a button to begin; or why nobody can."""
         found = self._studies.get(study)
         if found is None:
-            return self.plain(404, NOT_FOUND, NO_PAGE)
+            return self.plain(404, NOT_FOUND, NO_PAGE, self.spoken_to(request))
         spoken = found.in_language(_language(found, request))
         params = _link_params(request)
         why = await self._visits.closed(found, params)
@@ -166,13 +167,13 @@ class Pages:
         """A new visit, or the one that this person has; the answer leads to its page."""
         found = self._studies.get(study)
         if found is None:
-            return self.plain(404, NOT_FOUND, NO_PAGE)
+            return self.plain(404, NOT_FOUND, NO_PAGE, self.spoken_to(request))
         if not same_origin(request.headers):
-            return self.plain(403, NOT_USED, FOREIGN)
+            return self.plain(403, NOT_USED, FOREIGN, self.spoken_to(request))
         try:
             form = await read_form(request, self._max_form_bytes)
         except FormError as error:
-            return self.plain(error.status, NOT_USED, UNREADABLE)
+            return self.plain(error.status, NOT_USED, UNREADABLE, self.spoken_to(request))
         chosen = form.get(LANGUAGE_PARAM, [""])[0]
         language = chosen if chosen in found.languages else _language(found, request)
         wait_s = self._begin_wait_s(request)
@@ -204,11 +205,11 @@ class Pages:
 
     # ---- a visit -------------------------------------------------------------------------------------------
 
-    async def visit(self, token: str) -> Response:
+    async def visit(self, request: Request, token: str) -> Response:
         """The page of the step that the visit is at."""
         visit = await self._visits.find(token)
         if visit is None:
-            return await self._no_visit(token)
+            return await self._no_visit(request, token)
         overdue = self._visits.overdue(visit)
         if overdue is not None:
             await time_is_up(self._visits, self._matches, visit, overdue)
@@ -268,10 +269,10 @@ class Pages:
     async def submit(self, request: Request, token: str) -> Response:
         """Move on by what the step's form says; a form of another step changes nothing."""
         if not same_origin(request.headers):
-            return self.plain(403, NOT_USED, FOREIGN)
+            return self.plain(403, NOT_USED, FOREIGN, self.spoken_to(request))
         visit = await self._visits.find(token)
         if visit is None:
-            return await self._no_visit(token)
+            return await self._no_visit(request, token)
         language = visit.row.language
         asked = questionnaire_of(visit) if visit.active else None
         try:
@@ -294,10 +295,10 @@ class Pages:
             return await self._answered(visit, form) or on
         return on
 
-    async def _no_visit(self, token: str) -> Response:
+    async def _no_visit(self, request: Request, token: str) -> Response:
         if await self._visits.unserved(token):
-            return self.plain(410, NOT_SERVED, ANSWERS_STAY)
-        return self.plain(404, UNKNOWN, UNKNOWN_LINK)
+            return self.plain(410, NOT_SERVED, ANSWERS_STAY, self.spoken_to(request))
+        return self.plain(404, UNKNOWN, UNKNOWN_LINK, self.spoken_to(request))
 
     async def tell_broken(self, path: str) -> None:
         """Log which visit's page, at this path, could not be built: its number, never its link."""
@@ -342,7 +343,12 @@ class Pages:
 
     # ---- rendering -----------------------------------------------------------------------------------------
 
-    def plain(self, status: int, title: str, message: str, language: str = "en") -> Response:
+    def spoken_to(self, request: Request) -> str:
+        """The language of a page that belongs to no study: of all that are offered here, the browser's."""
+        offered = list(dict.fromkeys(code for study in self._studies.values() for code in study.languages))
+        return choose_language(offered or [SOURCE], request.headers.get("accept-language"))
+
+    def plain(self, status: int, title: str, message: str, language: str) -> Response:
         """A page that only says something, a marked message in a language."""
         say = self._visits.say(language)
         return self._page(

@@ -9,11 +9,11 @@ from typing import Annotated, Any, Final
 from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema
 
 from galley.files.reading import Loc, faults
+from galley.translations import LANGUAGE
 
-LANGUAGE: Final = r"^[a-z]{2,3}(-[A-Za-z0-9]{2,8})*$"
-"""Language codes as browsers send them: `en`, `zh`, `pt-BR`. Source: BCP 47."""
+CODE: Final = f"^{LANGUAGE}$"
 
-LanguageCode = Annotated[str, Field(pattern=LANGUAGE, max_length=20)]
+LanguageCode = Annotated[str, Field(pattern=CODE, max_length=20)]
 
 
 def _in_one_language(value: Any, info: ValidationInfo) -> Any:
@@ -35,10 +35,8 @@ def _in_one_language(value: Any, info: ValidationInfo) -> Any:
         for code, words in value.items()
         if not isinstance(words, str) or not words.strip()
     ]
-    missing = [code for code in offered if code not in value]
-    if missing or not value:
-        fix = f"add `{missing[0] if missing else 'en'}: ...`"
-        found.append(((), f"there are no words in '{missing[0] if missing else 'en'}'", fix))
+    missing = [code for code in offered or ("en",) if code not in value] if offered or not value else []
+    found += [((), f"there are no words in '{code}'", f"add `{code}: ...`") for code in missing]
     if found:
         raise faults(found)
     return value.get(context.get("language", ""), next(iter(value.values())))
@@ -50,7 +48,7 @@ _SCHEMA: Final = {
         {
             "type": "object",
             "description": "The words in each language, by its code.",
-            "propertyNames": {"pattern": LANGUAGE},
+            "propertyNames": {"pattern": CODE},
             "additionalProperties": {"type": "string", "minLength": 1},
             "minProperties": 1,
         },
@@ -68,7 +66,8 @@ Text = Annotated[str, Field(min_length=1, max_length=2000), _ONE_OF_MANY, WithJs
 def choose_language(offered: Sequence[str], accepted: str | None) -> str:
     """The offered language that a browser's `Accept-Language` header likes best; else the first offered.
 
-    `zh` fits `zh-CN` and the other way round. Weight 0 and what cannot be read count for nothing.
+    `zh` fits `zh-CN` and the other way round, and `de-CH` fits `de-AT` better than another language. Of those
+    that fit one wish the closest is taken. Weight 0 and what cannot be read count for nothing.
     """
     best, best_weight = offered[0], 0.0
     for part in (accepted or "").split(",")[:50]:
@@ -76,13 +75,15 @@ def choose_language(offered: Sequence[str], accepted: str | None) -> str:
         weighed = re.fullmatch(r"\s*q=([01](?:\.\d{0,3})?)\s*", parameters)
         weight = float(weighed[1]) if weighed else 0.0 if parameters.strip() else 1.0
         if weight > best_weight:
-            for one in offered:
-                if _alike(one, code):
-                    best, best_weight = one, weight
-                    break
+            closest = max(offered, key=lambda one: _closeness(one, code))
+            if _closeness(closest, code):
+                best, best_weight = closest, weight
     return best
 
 
-def _alike(one: str, other: str) -> bool:
+def _closeness(one: str, other: str) -> int:
+    """How well a language fits a wish: 0 not at all, 1 the same one elsewhere, more the more they share."""
     a, b = one.lower(), other.strip().lower()
-    return bool(b) and (a == b or a.startswith(f"{b}-") or b.startswith(f"{a}-"))
+    if b and (a == b or a.startswith(f"{b}-") or b.startswith(f"{a}-")):
+        return 1 + min(len(a), len(b))
+    return int(a.partition("-")[0] == b.partition("-")[0])
