@@ -140,8 +140,36 @@ def test_each_kind_of_fault_is_told_once() -> None:
 
 
 def test_slowness_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    ticks = itertools.count()
-    monkeypatch.setattr("time.thread_time", lambda: 0.06 * next(ticks))
+    now = iter(itertools.accumulate(itertools.cycle([0.0, 0.01, 0.0, 0.01, 0.0, 0.06])))
+    monkeypatch.setattr("time.thread_time", lambda: next(now))
     (found,) = check(Stay, ROOM).faults
     assert found.what == "decisions are slow: 99th percentile 60.0 ms, more than 50 ms"
     assert "reset" in found.fix
+
+
+@pytest.mark.parametrize(
+    ("decision_ms", "asked", "told"),
+    [(119.3, 60, "first 50 took 119.3 ms"), (2000, 15, "first 5 took 2000.0 ms")],
+)
+def test_d11_who_is_too_slow_is_given_up_after_the_first_decisions(
+    monkeypatch: pytest.MonkeyPatch, decision_ms: float, asked: int, told: str
+) -> None:
+    readings = itertools.count()
+    monkeypatch.setattr("time.thread_time", lambda: decision_ms / 1000 * next(readings))
+    found = check(Stay, ROOM, ticks=400)
+    (fault,) = found.faults
+    assert told in fault.what
+    assert "where 50 ms is the most" in fault.what
+    assert found.decision_p50_ms == pytest.approx(decision_ms)
+    assert not found.whole
+    assert next(readings) // 2 <= asked, "no more decisions than it takes to know"
+
+
+def test_d11_how_far_the_check_has_come_is_told() -> None:
+    told: list[tuple[str, int, int]] = []
+    check(Stay, ROOM, ticks=20, progress=lambda *row: told.append(row))
+    assert {what for what, _, _ in told} == {
+        f"on room {doing}, tick"
+        for doing in ("plays beside itself", "plays it again", "is shown what was done")
+    }
+    assert all(0 <= done < of == 20 for _, done, of in told)

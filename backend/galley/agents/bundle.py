@@ -54,6 +54,7 @@ class Bundle:
     sha256: str
     path: Path
     loaded: Loaded[Description]
+    limit_s: float | None = None
     _networks: dict[Layout, tuple[Network, Encoder]] = field(default_factory=dict, repr=False)
 
     def supports(self, layout_name: str) -> bool:
@@ -89,7 +90,7 @@ class Bundle:
             encoder = Encoder(layout, str(self.loaded.value.encoding))
             path = self.path / self.layouts[layout.name]
             try:
-                self._networks[layout] = (Network(path, tuple(encoder.shape)), encoder)
+                self._networks[layout] = (Network(path, tuple(encoder.shape), self.limit_s), encoder)
             except GalleyError as error:
                 raise InvalidFiles([self.network_problem(layout.name, str(error))]) from None
         return self._networks[layout]
@@ -125,8 +126,10 @@ def describe_network(
     write_whole(folder / DESCRIPTION_FILE, text.getvalue())
 
 
-def load_bundle(folder: Path, shown: str) -> Bundle:
+def load_bundle(folder: Path, shown: str, limit_s: float | None = None) -> Bundle:
     """The agent in a folder; messages call the folder `shown`. Networks are loaded when first needed.
+
+    With `limit_s` a decision of a network that takes longer is given up.
 
     Raises:
         InvalidFiles: everything that is wrong with agent.yaml and the files that it names.
@@ -137,7 +140,7 @@ def load_bundle(folder: Path, shown: str) -> Bundle:
         raise InvalidFiles(problems)
     description = loaded.value
     layouts = None if description.layouts == "any" else dict(description.layouts)
-    return Bundle(description.name, description.kind, layouts, _sha256(folder), folder, loaded)
+    return Bundle(description.name, description.kind, layouts, _sha256(folder), folder, loaded, limit_s)
 
 
 def _problems(loaded: Loaded[Description], folder: Path) -> list[Problem]:

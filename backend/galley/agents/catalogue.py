@@ -10,13 +10,18 @@ from galley.errors import InvalidFiles, Problem
 from galley.kitchen import Layout
 from galley.kitchen.layout_file import load_layout
 from galley.names import name_fix
+from galley.progress_lines import Progress, untold
 from galley.workspace import Workspace
 
 
 class Catalogue:
-    """All agent bundles of a workspace; each is read when first asked for."""
+    """All agent bundles of a workspace; each is read when first asked for.
 
-    def __init__(self, workspace: Workspace) -> None:
+    With `limit_s` a decision of a network that takes longer is given up.
+    """
+
+    def __init__(self, workspace: Workspace, limit_s: float | None = None) -> None:
+        self._limit_s = limit_s
         self._workspace = workspace
         self._bundles: dict[str, Bundle] = {}
 
@@ -33,10 +38,10 @@ class Catalogue:
         """
         if name not in self._bundles:
             folder = self._workspace.find("agents", name)
-            self._bundles[name] = load_bundle(folder, self._workspace.shown(folder))
+            self._bundles[name] = load_bundle(folder, self._workspace.shown(folder), self._limit_s)
         return self._bundles[name]
 
-    def check(self) -> list[Problem]:
+    def check(self, progress: Progress = untold) -> list[Problem]:
         """All problems of all bundles: their files, and how they play on every layout that they name.
 
         Those that name none are tried on the smallest and the largest of the workspace. Wrong layout files
@@ -57,7 +62,7 @@ class Catalogue:
                     continue
                 layout = layouts[layout_name]
                 if layout is not None:
-                    problems += problems_on(bundle, layout)
+                    problems += problems_on(bundle, layout, progress)
         return problems
 
     def _layouts(self) -> tuple[dict[str, Layout | None], list[Problem]]:
@@ -74,10 +79,10 @@ class Catalogue:
         return layouts, problems
 
 
-def problems_on(bundle: Bundle, layout: Layout) -> tuple[Problem, ...]:
+def problems_on(bundle: Bundle, layout: Layout, progress: Progress = untold) -> tuple[Problem, ...]:
     """Every promise that a bundle's agents break on a layout, at its line in agent.yaml."""
     try:
-        faults = check(bundle.make, layout, think_ms=bundle.think_ms).faults
+        faults = check(bundle.make, layout, think_ms=bundle.think_ms, progress=_of(bundle, progress)).faults
     except InvalidFiles as error:
         return error.problems
     place = ("layouts",) if bundle.layouts is None else ("layouts", layout.name)
@@ -89,6 +94,10 @@ def problems_on(bundle: Bundle, layout: Layout) -> tuple[Problem, ...]:
         )
         for fault in faults
     )
+
+
+def _of(bundle: Bundle, progress: Progress) -> Progress:
+    return lambda what, done, of: progress(f"{bundle.name} {what}", done, of)
 
 
 def _extremes(layouts: Mapping[str, Layout | None]) -> list[str]:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import threading
+import time
+import weakref
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 import onnxruntime as ort
@@ -18,21 +21,31 @@ from galley.kitchen import ACTIONS, Encoder, Layout
 
 Sampling = Literal["sample", "argmax"]
 
+DECISION_S: Final = 30.0
+"""For so long a decision is waited for where nobody plays; then it will never come."""
+
 ACTION_COUNT = len(ACTIONS)
 _WORD = (1 << 64) - 1
 
 
+class DecisionGivenUp(GalleyError):
+    """A network did not come back from a decision."""
+
+
 class Network:
     """One ONNX policy for one layout: observations in, logits out; holds no memory of any episode.
+
+    With `limit_s` a run that takes longer is given up.
 
     Raises:
         GalleyError: the file is missing or not ONNX, or its inputs and outputs are not those of a policy
             with observations of `shape` (of one seat, without batch).
     """
 
-    def __init__(self, path: Path, shape: tuple[int, ...]) -> None:
+    def __init__(self, path: Path, shape: tuple[int, ...], limit_s: float | None = None) -> None:
         self.path = path
         self.shape = shape
+        self._patience = None if limit_s is None else _Patience(limit_s)
         options = ort.SessionOptions()
         options.intra_op_num_threads = 1
         options.inter_op_num_threads = 1
@@ -66,13 +79,23 @@ class Network:
         Raises:
             GalleyError: the network gives another shape, or numbers that are not finite (told for the batch
                 as a whole: ask rows one by one to learn which).
+            DecisionGivenUp: it took longer than the limit.
         """
         feed = {"observation": observations}
         if states is not None:
             feed["state_in"] = states
+        names = ["logits"] + (["state_out"] if self.recurrent else [])
+        patience = self._patience
         try:
-            found = self._session.run(["logits"] + (["state_out"] if self.recurrent else []), feed)
+            if patience is None:
+                found = self._session.run(names, feed)
+            else:
+                with patience as options:
+                    found = self._session.run(names, feed, options)
         except Exception as error:  # as above
+            if patience is not None and patience.ended:
+                told = f"{self.path.name}: a decision did not come back within {patience.limit_s:g} s"
+                raise DecisionGivenUp(told) from None
             raise GalleyError(f"{self.path.name}: the network cannot be run ({_first_line(error)})") from None
         logits = np.asarray(found[0])
         wanted = (len(observations), ACTION_COUNT)
@@ -119,6 +142,42 @@ class Network:
         if told:
             raise GalleyError("; ".join(told))
         return tuple(inputs["state_in"].shape[1:]) if recurrent else None
+
+
+class _Patience:
+    """Ends a run of ONNX Runtime that takes longer than `limit_s`, by a thread of its own."""
+
+    def __init__(self, limit_s: float) -> None:
+        self.limit_s = limit_s
+        self.ended = False
+        self._runs: tuple[ort.RunOptions, float] | None = None
+        threading.Thread(target=_look_at, args=(weakref.ref(self), limit_s / 10), daemon=True).start()
+
+    def __enter__(self) -> ort.RunOptions:
+        options = ort.RunOptions()
+        options.log_severity_level = 4  # that it was ended is told once, by us
+        self._runs = (options, time.monotonic())
+        return options
+
+    def __exit__(self, *_: object) -> None:
+        self._runs = None
+
+    def look(self) -> None:
+        """End the run if its time is up."""
+        runs = self._runs
+        if runs is not None and time.monotonic() - runs[1] > self.limit_s:
+            self.ended = True
+            runs[0].terminate = True
+
+
+def _look_at(of: weakref.ref[_Patience], every_s: float) -> None:
+    while True:
+        time.sleep(min(every_s, 0.5))
+        patience = of()
+        if patience is None:
+            return
+        patience.look()
+        del patience
 
 
 class NetworkAgents:

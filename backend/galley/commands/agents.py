@@ -10,7 +10,7 @@ import zipfile
 from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from galley.agents.admission.adding import Converted
 
 app = typer.Typer(help="Agents: list, check, play, add.", no_args_is_help=True)
+
+
+CONVERT_S: Final = 300
+"""For so long a network's own program may run while it is made into ONNX."""
 
 
 class Origin(StrEnum):
@@ -57,10 +61,12 @@ def list_agents(workspace: WorkspaceOption = Path(), json_: JsonOption = False) 
 def check(workspace: WorkspaceOption = Path()) -> None:
     """Load and try every bundle; name wrong shapes, NaNs, missing layouts and slow agents."""
     from galley.agents.catalogue import Catalogue
+    from galley.agents.network import DECISION_S
+    from galley.progress_lines import ProgressLines
     from galley.workspace import Workspace
 
-    catalogue = Catalogue(Workspace(workspace))
-    problems = catalogue.check()
+    catalogue = Catalogue(Workspace(workspace), DECISION_S)
+    problems = catalogue.check(ProgressLines())
     if problems:
         raise InvalidFiles(problems)
     typer.echo(f"No problems in {len(catalogue.names())} agents.")
@@ -79,12 +85,13 @@ def play(
     """Let two agents play each other in both seat orders; print mean scores and standard errors."""
     from galley.agents.catalogue import Catalogue
     from galley.agents.episode import play_both_orders
+    from galley.agents.network import DECISION_S
     from galley.evaluation.game_scores import MeanScore
     from galley.kitchen.layout_file import find_layout
     from galley.workspace import Workspace
 
     place = Workspace(workspace)
-    catalogue = Catalogue(place)
+    catalogue = Catalogue(place, DECISION_S)
     bundles = catalogue.bundle(first), catalogue.bundle(second)
     both = play_both_orders(*bundles, find_layout(place, layout), games, seed)
     for seats, scores in zip(((first, second), (second, first)), both, strict=True):
@@ -144,6 +151,7 @@ def add(
 ) -> None:
     """Let a network in as an agent if it passes the gate; else tell every reason and leave all as it was."""
     from galley.agents.admission.adding import Newcomer, add_network
+    from galley.progress_lines import ProgressLines, ends_within
     from galley.workspace import Workspace
 
     if (from_ is Origin.state_dict) != (network is not None):
@@ -160,10 +168,14 @@ def add(
     )
 
     def convert(path: Path, shape: tuple[int, ...]) -> Converted:
-        return _converted(path, shape, from_, network)
+        told = (
+            f"{path}: it was not made into ONNX within {CONVERT_S} s; it does not end, or export it yourself"
+        )
+        with ends_within(CONVERT_S, told):
+            return _converted(path, shape, from_, network)
 
     try:
-        added = add_network(Workspace(workspace), new, convert, replace=replace)
+        added = add_network(Workspace(workspace), new, convert, replace=replace, progress=ProgressLines())
     except InvalidFiles as error:
         if json_:
             typer.echo(json.dumps({"name": name, "added": False, "reasons": _reasons(error.problems)}))
@@ -208,12 +220,15 @@ def _converted(path: Path, shape: tuple[int, ...], origin: Origin, network: str 
     """The network of a file as ONNX; what changes files is imported only if one must be changed."""
     if origin is Origin.onnx:
         from galley.agents.admission.adding import as_it_is
+        from galley.agents.network import DecisionGivenUp
 
         meant = _other_kind(path)
         if meant is not None:
             raise GalleyError(f"this is no ONNX file but {meant}")
         try:
             return as_it_is(path, shape)
+        except DecisionGivenUp:
+            raise
         except GalleyError as error:
             _need(["onnx"], f"{error}; what can be mended is mended with the package onnx")
         from galley.learning.bundles.onnx_adapting import conform

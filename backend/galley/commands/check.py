@@ -35,8 +35,10 @@ def check(
     place = Workspace(workspace)
     if study is None:
         from galley.agents.catalogue import Catalogue
+        from galley.agents.network import DECISION_S
+        from galley.progress_lines import ProgressLines
 
-        problems = [*check_workspace(place), *Catalogue(place).check()]
+        problems = [*check_workspace(place), *Catalogue(place, DECISION_S).check(ProgressLines())]
     else:
         problems = check_study(place, study)
     if problems:

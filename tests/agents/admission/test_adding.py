@@ -71,7 +71,7 @@ def test_all_reasons_are_told_at_once(tmp_path: Path, monkeypatch: pytest.Monkey
         "policy.onnx: for layout 'den': input 'observation' has shape ['B', 3], not ['B', 62]; output",
         "; output 'logits' has shape ['B', 5], not ['B', 6]",
         "nan.onnx: on layout 'room' room.onnx: the logits hold NaN or infinite numbers",
-        "nan.onnx: on layout 'room' decisions are slow: 99th percentile 60.0 ms",
+        "nan.onnx: on layout 'room' decisions are too slow: half of the first 50 took 60.0 ms",
     ):
         assert expected in found
     assert len(found.splitlines()) == 5

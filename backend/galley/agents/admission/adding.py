@@ -12,12 +12,13 @@ import numpy as np
 from galley.agents.admission.card import card
 from galley.agents.admission.gate import Figures, gate, probabilities
 from galley.agents.bundle import describe_network, load_bundle
-from galley.agents.network import Network, Sampling
+from galley.agents.network import DECISION_S, DecisionGivenUp, Network, Sampling
 from galley.errors import GalleyError, InvalidFiles, Problem
 from galley.files.whole import whole_folder
 from galley.kitchen import ENCODINGS, Encoder, Layout
 from galley.kitchen.layout_file import find_layout
 from galley.names import name_fix
+from galley.progress_lines import Progress, untold
 from galley.workspace import NAME, Workspace
 
 MEND = "mend it and add it again, see docs/add-an-agent.md"
@@ -71,7 +72,14 @@ class _Work:
     problems: list[Problem] = field(default_factory=list)
 
 
-def add_network(workspace: Workspace, new: Newcomer, convert: Convert, *, replace: bool = False) -> Added:
+def add_network(
+    workspace: Workspace,
+    new: Newcomer,
+    convert: Convert,
+    *,
+    replace: bool = False,
+    progress: Progress = untold,
+) -> Added:
     """The bundle made of a network's files, in `agents/` of the workspace with its card.
 
     Raises:
@@ -94,7 +102,7 @@ def add_network(workspace: Workspace, new: Newcomer, convert: Convert, *, replac
         work.problems.append(Problem("--encoding", None, told, name_fix(new.encoding, ENCODINGS)))
     _convert_all(workspace, new, convert, work)
     with whole_folder(place if named else agents / "agent", replace=replace) as folder:
-        figures = _tried(folder, new, work)
+        figures = _tried(folder, new, work, progress)
         if work.problems:
             raise InvalidFiles(work.problems)
         (folder / "card.md").write_text(_card_text(new, work, figures), "utf-8")
@@ -109,12 +117,14 @@ def as_it_is(path: Path, shape: tuple[int, ...]) -> Converted:
     Raises:
         GalleyError: why it does.
     """
-    network = Network(path, shape)
+    network = Network(path, shape, DECISION_S)
     seen = np.random.default_rng(0).integers(0, 3, (4, *shape)).astype(np.float32)
     memory = network.start()
     states = None if memory is None else np.repeat(memory[None], len(seen), axis=0)
     try:
         rows, _ = network.run(seen, states)
+    except DecisionGivenUp:
+        raise
     except GalleyError:  # the gate tells it, with all else
         return Converted(path.read_bytes())
     if probabilities(rows):
@@ -147,7 +157,7 @@ def _convert_all(workspace: Workspace, new: Newcomer, convert: Convert, work: _W
         work.converted[layout.name] = converted
 
 
-def _tried(folder: Path, new: Newcomer, work: _Work) -> list[Figures]:
+def _tried(folder: Path, new: Newcomer, work: _Work, progress: Progress) -> list[Figures]:
     """The figures of all layouts that could be converted; the reasons to reject go to the problems."""
     if not work.converted:
         return []
@@ -160,11 +170,11 @@ def _tried(folder: Path, new: Newcomer, work: _Work) -> list[Figures]:
         sampling=new.sampling,
         unstuck_after_ticks=new.unstuck_after_ticks,
     )
-    bundle = load_bundle(folder, f"agents/{folder.name}")
+    bundle = load_bundle(folder, f"agents/{folder.name}", DECISION_S)
     figures = []
     sources = dict(_by_layout(new.files, work))
     for name, layout in work.layouts.items():
-        measured, faults = gate(bundle, layout)
+        measured, faults = gate(bundle, layout, progress)
         figures.append(measured)
         shown = sources[name].as_posix()
         work.problems += [Problem(shown, None, f"on layout '{name}' {fault}", MEND) for fault in faults]

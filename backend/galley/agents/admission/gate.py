@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from galley.agents.bundle import Bundle
 from galley.agents.choosing import choose
 from galley.agents.conformance import check
-from galley.agents.network import Network
+from galley.agents.network import DecisionGivenUp, Network
 from galley.compiled.randomness import uniform
 from galley.errors import GalleyError, InvalidFiles
 from galley.kitchen import ACTIONS, Encoder, KitchenBatch, Layout
+from galley.progress_lines import Progress, untold
 
 GATE_TICKS: Final = 400
 KITCHENS: Final = 16
@@ -45,24 +46,25 @@ class Figures:
         return {name: None if value != value else value for name, value in asdict(self).items()}
 
 
-def gate(bundle: Bundle, layout: Layout) -> tuple[Figures, tuple[str, ...]]:
+def gate(bundle: Bundle, layout: Layout, progress: Progress = untold) -> tuple[Figures, tuple[str, ...]]:
     """The figures of a network agent on a layout, and every reason to reject it there.
 
     It plays both seats for 400 ticks, twice with one seed; and it is asked about both seats of kitchens whose
-    chefs act at random, as one batch and row by row.
+    chefs act at random, as one batch and row by row. Who is given up on the way is not asked further.
     """
     long = layout.with_rules(horizon_ticks=max(GATE_TICKS, layout.rules.horizon_ticks))
     nan = float("nan")
     try:
-        found = check(bundle.make, long, GATE_TICKS, bundle.think_ms)
+        found = check(bundle.make, long, GATE_TICKS, bundle.think_ms, progress)
     except InvalidFiles as error:
         nothing = Figures(layout.name, 0, 0, nan, nan, nan, nan)
         return nothing, tuple(problem.message for problem in error.problems)
-    network, encoder = bundle.network(long)
-    batched_ms, apart, faults = _asked_at_random(network, encoder, long)
+    batched_ms, apart, faults = nan, nan, list[str]()
+    if found.whole:
+        batched_ms, apart, faults = _asked_at_random(*bundle.network(long), long, progress)
     figures = Figures(
         layout.name,
-        GATE_TICKS,
+        GATE_TICKS if found.whole else 0,
         found.score,
         found.decision_p50_ms,
         found.decision_p99_ms,
@@ -77,7 +79,9 @@ def probabilities(rows: NDArray[np.floating]) -> bool:
     return bool((rows >= 0).all() and (abs(rows.sum(axis=1) - 1) < SAME_SUM).all())
 
 
-def _asked_at_random(network: Network, encoder: Encoder, layout: Layout) -> tuple[float, float, list[str]]:
+def _asked_at_random(
+    network: Network, encoder: Encoder, layout: Layout, progress: Progress
+) -> tuple[float, float, list[str]]:
     """Time of a batched decision in ms, how far batch and single rows are apart, and what was wrong."""
     kitchens = KitchenBatch(layout, KITCHENS)
     numbers = np.arange(KITCHENS)
@@ -86,6 +90,7 @@ def _asked_at_random(network: Network, encoder: Encoder, layout: Layout) -> tupl
     times_ms: list[float] = []
     apart, apart_in_actions, always_probabilities = 0.0, False, True
     for tick in range(GATE_TICKS):
+        progress(f"on {layout.name} is asked in {KITCHENS} kitchens at once, tick", tick, GATE_TICKS)
         seen = encoder.both(kitchens.states).reshape(-1, *encoder.shape).astype(np.float32)
         try:
             start = time.thread_time()
@@ -104,6 +109,9 @@ def _asked_at_random(network: Network, encoder: Encoder, layout: Layout) -> tupl
                 apart_in_actions |= not np.array_equal(
                     choose(logits, free, draws), choose(alone, free, draws)
                 )
+        except DecisionGivenUp as error:
+            faults.append(str(error))
+            break
         except GalleyError as error:
             faults.append(str(error))
             always_probabilities = False
