@@ -110,7 +110,7 @@ def _rows(fields: dict[str, FieldInfo]) -> str:
 def _values(field: FieldInfo) -> str:
     found = list(dict.fromkeys(_kinds(field.annotation)))
     limits = [_limit(rule) for rule in field.metadata]
-    if field.annotation in (str,) and languages._ONE_OF_MANY in field.metadata:
+    if field.annotation in (str,) and languages.SAID_IN_LANGUAGES in field.metadata:
         found, limits = ["words"], []
     inner = [rule for part in _parts(field.annotation) for rule in getattr(part, "metadata", ())]
     limits += [_limit(rule) for rule in inner]
@@ -132,7 +132,7 @@ def _kinds(annotation: Any) -> Iterator[str]:
     if origin is Annotated:
         base, *rules = get_args(annotation)
         patterned = any(isinstance(rule, FieldInfo) and "anyOf" in str(rule) for rule in rules)
-        if languages._ONE_OF_MANY in rules or patterned:
+        if languages.SAID_IN_LANGUAGES in rules or patterned:
             yield "words"
         else:
             yield from _kinds(base)

@@ -97,7 +97,7 @@ def test_f21_d4_missing_words_and_languages_without_a_catalogue_are_remarked(
     told = [str(remark) for remark in study_remarks(place, load_study(place, "remarks"))]
     assert any(one.startswith("studies/remarks.yaml:7: 'NA' is what pandas and R read as") for one in told)
     assert sum("questionnaires/missing.yaml:8: 'n" in one for one in told) == 2
-    assert any("not translated to 'it'" in one for one in told)
+    assert any("no catalogue for 'it'" in one for one in told)
     assert not any("'control'" in one or "'some'" in one for one in told)
 
 

@@ -8,9 +8,9 @@ from typing import Final
 from galley.errors import Problem
 from galley.files.reading import Loc, read
 from galley.kitchen.layout_file import layout_remarks
+from galley.study.language_remarks import language_remarks
 from galley.study.study import Study
 from galley.study.written.study_file import StudyFile
-from galley.translations import SOURCE, Catalogues
 from galley.workspace import Workspace
 
 PROXY_FORM_BYTES: Final = 1024 * 1024
@@ -31,7 +31,7 @@ def study_remarks(workspace: Workspace, study: Study) -> Iterator[Problem]:
         for place, level in enumerate(factor.levels):
             if level.casefold() in READ_AS_MISSING:
                 yield _missing(Problem(shown, loaded.line("factors", name, "levels", place), "", ""), level)
-    yield from _catalogues(study, shown, loaded.line("languages"))
+    yield from language_remarks(workspace, study, document)
     for name, questionnaire in study.questionnaires.items():
         file = workspace.find("questionnaires", name)
         lines = read(file, workspace.shown(file)).lines
@@ -57,12 +57,3 @@ def _missing(place: Problem, value: str) -> Problem:
     told = f"'{value}' is what pandas and R read as a missing value"
     fix = 'use another word, or read exports with keep_default_na=False (R: na.strings = "")'
     return Problem(place.path, place.line, told, fix)
-
-
-def _catalogues(study: Study, shown: str, line: int) -> Iterator[Problem]:
-    """Languages of the study in which buttons and messages of ours are not translated."""
-    catalogues = Catalogues.load()
-    for language in study.languages:
-        if catalogues.translator(language).language == SOURCE and language.partition("-")[0] != SOURCE:
-            told = f"buttons and messages are not translated to '{language}': they are shown in English"
-            yield Problem(shown, line, told, "add a catalogue, see docs/translations.md")

@@ -19,7 +19,7 @@ from galley.study.written.named_files import (
     known_layouts_of,
     text_file,
 )
-from galley.study.written.questionnaire import Questionnaire, load_questionnaire
+from galley.study.written.questionnaire import Questionnaire, load_questionnaire, why_not_in
 from galley.study.written.recruitment import Ending, filled, kept, load_invitations
 from galley.study.written.study_file import StudyFile, names_of
 from galley.study.written.texts import PageText, load_text
@@ -184,15 +184,20 @@ class _Reader:
             loaded = document.validated(StudyFile, {**context, **spoken})
         except InvalidFiles as invalid:
             self.problems.extend(invalid.problems)
-            return None
+            # Its words lack in this language; what else lacks is in the files that it names.
+            loaded, whole = document.validated(StudyFile, context), False
+        else:
+            whole = True
         config = loaded.value
         read = {}
         for name in names_of(config, "questionnaires"):
             file = self.workspace.find("questionnaires", name)
+            shown = self.workspace.shown(file)
             try:
-                read[name] = load_questionnaire(file, self.workspace.shown(file), spoken).value
+                read[name] = load_questionnaire(file, shown, spoken).value
             except InvalidFiles as invalid:
                 self.problems.extend(invalid.problems)
+                self.problems.extend(why_not_in(self.language, file, shown, invalid.problems))
         self.problems.extend(questionnaire_problems(loaded, read))
         everybody = self._quoted(loaded, ranges(config, read, config.conditions()))
         made = {tuple(everybody.numbers.values()): everybody}
@@ -203,7 +208,7 @@ class _Reader:
             if key not in made:
                 made[key] = self._quoted(loaded, numbers)
             by_condition[tuple(condition.values())] = made[key]
-        return config, read, everybody, by_condition
+        return (config, read, everybody, by_condition) if whole else None
 
     def _quoted(self, loaded: Loaded[StudyFile], numbers: Ranges) -> Quoted:
         """Every text that can be read, with these numbers in it."""

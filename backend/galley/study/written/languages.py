@@ -54,12 +54,13 @@ _SCHEMA: Final = {
         },
     ]
 }
-_ONE_OF_MANY = BeforeValidator(_in_one_language)
+SAID_IN_LANGUAGES: Final = BeforeValidator(_in_one_language)
+"""What marks words that participants read, and takes those of one language."""
 
-Words = Annotated[str, Field(max_length=2000), _ONE_OF_MANY, WithJsonSchema(_SCHEMA)]
+Words = Annotated[str, Field(max_length=2000), SAID_IN_LANGUAGES, WithJsonSchema(_SCHEMA)]
 """Words that a participant reads; may be empty. A file writes `words` or `{en: words, zh: words}`."""
 
-Text = Annotated[str, Field(min_length=1, max_length=2000), _ONE_OF_MANY, WithJsonSchema(_SCHEMA)]
+Text = Annotated[str, Field(min_length=1, max_length=2000), SAID_IN_LANGUAGES, WithJsonSchema(_SCHEMA)]
 """Words that a participant reads; never empty."""
 
 

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator
 
-from galley.files.reading import FileModel, Loaded, Loc, faults, load
+from galley.errors import Problem
+from galley.files.reading import FileModel, Loaded, Loc, faults, load, read
 from galley.study.written.item_base import BYTES_PER_CHARACTER, Answer, Say
 from galley.study.written.items import Item
-from galley.study.written.languages import Text, Words
+from galley.study.written.languages import LanguageCode, Text, Words
 
 RESERVED_IDS = ("step",)
 """Names of form fields that the pages need themselves."""
@@ -26,6 +27,10 @@ class Questionnaire(FileModel):
     """The heading of its page."""
     source: Text
     """Where its items come from."""
+    language: LanguageCode | None = None
+    """The language of words that are given once; without it, that of the study."""
+    translations: Annotated[str, Field(max_length=2000)] = ""
+    """Where translations are published, or why there are none: `galley check` tells it with what lacks."""
     intro: Words = ""
     """Words above the items."""
     order: Literal["fixed", "random"] = "fixed"
@@ -84,6 +89,20 @@ def load_questionnaire(
         InvalidFiles: everything that is wrong with it.
     """
     return load(path, Questionnaire, shown, context)
+
+
+def why_not_in(language: str, path: Path, shown: str, problems: Iterable[Problem]) -> Iterator[Problem]:
+    """What a file says of its translations, where `problems` say that it has no words in a language."""
+    lacking = sum(f"no words in '{language}'" in problem.message for problem in problems)
+    if not lacking:
+        return
+    document = read(path, shown)
+    told = document.data.get("translations")
+    if isinstance(told, str):
+        count = f"{lacking} of its texts are not in '{language}'"
+        yield Problem(
+            shown, document.lines[("translations",)], f"{count}: {told.rstrip('.')}", "translate them"
+        )
 
 
 def validate_answers(
