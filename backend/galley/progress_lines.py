@@ -33,7 +33,7 @@ class ProgressLines:
         now_s = time.monotonic()
         if now_s < self._next_s:
             return
-        self._next_s = now_s + EVERY_S
+        self._next_s = now_s + max(EVERY_S, (now_s - self._began_s) / 10)
         sys.stderr.write(f"{what}: {done} of {of} ({now_s - self._began_s:.0f} s)\n")
         sys.stderr.flush()
 

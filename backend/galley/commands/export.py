@@ -42,26 +42,13 @@ def export(
     database: DatabaseOption = None,
 ) -> None:
     """Write participants, rounds, ticks, responses and events as CSV, with their data dictionary."""
-    from galley.records.export.bonus_payments import export_bonuses
-    from galley.records.export.study_export import export_study
-    from galley.records.export.trajectory_export import export_human_data, export_trajectories
+    from galley.records.export.whole_export import Wanted, write_files
     from galley.records.store.store import Store
     from galley.workspace import Workspace
 
     os.umask(0o077)  # people's data: for this account alone
+    wanted = Wanted(formats or ("csv",), trajectories, human_data, bonuses, tests)
     with Store.open(database or Workspace(workspace).database, must_exist=True) as store:
-        written = {
-            out / file: f"{rows} rows"
-            for file, rows in export_study(store, study, out, formats or ("csv",), tests).items()
-        }
-        if trajectories:
-            file = out / "trajectories.zip"
-            written[file] = f"{export_trajectories(store, study, file, tests)} episodes"
-        if human_data:
-            file = out / "human-data.csv"
-            written[file] = f"{export_human_data(store, study, file, tests)} rows"
-        if bonuses:
-            file = out / "bonuses.csv"
-            written[file] = f"{export_bonuses(store, study, file, tests)} people"
+        written = write_files(store, study, out, wanted)
     for file, count in written.items():
         typer.echo(f"{file}: {count}")

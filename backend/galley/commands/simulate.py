@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 from pathlib import Path
 from typing import Annotated
 
@@ -31,17 +33,34 @@ def simulate(
     delay_ms: Annotated[
         float, typer.Option(min=0, metavar="D", help="Network delay to add, each way, ms.")
     ] = 0.0,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="New folder for an export of the simulated people, marked as such.",
+        ),
+    ] = None,
     workspace: WorkspaceOption = Path(),
     json_: JsonOption = False,
 ) -> None:
-    """Let simulated participants walk through a study; print how it went. Exits with 1 when a visit broke."""
+    """Let simulated participants walk through a study; print how it went. Exits with 1 when a visit broke.
+
+    Without --url the study's own records stay as they are, with --out too.
+    """
+    from galley.progress_lines import ProgressLines
     from galley.simulate.results import in_words
     from galley.simulate.simulation import Simulation
     from galley.simulate.simulation import simulate as run
     from galley.workspace import Workspace
 
+    if out is not None and url is not None:
+        raise typer.BadParameter("it needs a server of its own; leave --url out", param_hint="--out")
+    if out is not None:
+        os.umask(0o077)
+    # What was begun is taken away then as after Ctrl-C.
+    signal.signal(signal.SIGTERM, lambda *_: signal.raise_signal(signal.SIGINT))
     wanted = Simulation(study, participants, seed, dropout, in_flight, agent, delay_ms)
-    report = run(Workspace(workspace), wanted, url)
+    report = run(Workspace(workspace), wanted, url, out, ProgressLines())
     typer.echo(json.dumps(report) if json_ else in_words(report))
     if report["errors"]:
         raise typer.Exit(1)

@@ -98,6 +98,7 @@ def in_words(report: Mapping[str, Any]) -> str:
             )
     lines.append(f"  {'errors':18} {report['errors']}")
     lines += [f"    {error}" for error in report["first_errors"]]
+    lines += [f"{file}: {count}" for file, count in report.get("files", {}).items()]
     return "\n".join(lines)
 
 

@@ -12,7 +12,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import AsyncExitStack, contextmanager
+from contextlib import AsyncExitStack, ExitStack, contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,8 @@ from galley.agents.scripted import Random
 from galley.errors import GalleyError
 from galley.kitchen import Layout
 from galley.kitchen.layout_file import load_layouts
+from galley.progress_lines import Progress, untold
+from galley.records.export.simulated_export import new_folder, write_simulated
 from galley.simulate.delay import delayed
 from galley.simulate.participant import Participant, World, known_answers
 from galley.simulate.results import Figures
@@ -34,6 +36,7 @@ from galley.workspace import Workspace
 
 PAGE_TIMEOUT_S = 60.0
 STOP_WITHIN_S = 20.0
+DATABASE = "simulated.sqlite"
 UNLIMITED = {"REQUESTS_PER_S": "0", "BEGINS_PER_MIN": "0", "ADDRESS_MESSAGES_PER_S": "1000000"}
 """Settings of a server of one's own: all simulated participants come from one address."""
 
@@ -50,9 +53,25 @@ class Simulation:
     agent: str = "myopic"
     delay_ms: float = 0.0
 
+    def command(self) -> str:
+        """The command that simulates the same."""
+        options = {"participants": self.participants, "seed": self.seed, "agent": self.agent}
+        told = " ".join(f"--{name} {value}" for name, value in options.items())
+        return f"galley simulate {self.study} {told}" + (
+            f" --dropout {self.dropout:g}" if self.dropout else ""
+        )
 
-def simulate(workspace: Workspace, simulation: Simulation, url: str | None = None) -> dict[str, Any]:
+
+def simulate(
+    workspace: Workspace,
+    simulation: Simulation,
+    url: str | None = None,
+    out: Path | None = None,
+    progress: Progress = untold,
+) -> dict[str, Any]:
     """The report of a simulation; without a URL it has a server and records of its own, gone at the end.
+
+    With `out` these are exported to that new folder before; what was written is in the report as `files`.
 
     Raises:
         GalleyError: the workspace has no such study or agent, or the server cannot be reached.
@@ -60,14 +79,27 @@ def simulate(workspace: Workspace, simulation: Simulation, url: str | None = Non
     """
     study = load_study(workspace, simulation.study)
     world = _world(workspace, study, simulation)
-    began_s = time.monotonic()
     if url is not None:
-        asyncio.run(_all(url.rstrip("/"), simulation, study, world))
-    else:
-        with own_server(workspace, simulation.study) as own:
-            began_s = time.monotonic()
-            asyncio.run(_all(own, simulation, study, world))
-    world.thinks.shutdown()
+        return _simulated(url.rstrip("/"), simulation, study, world, progress)
+    with ExitStack() as stack:
+        place = None if out is None else stack.enter_context(new_folder(out))
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="galley-simulate-")))
+        with own_server(workspace, simulation.study, folder) as own:
+            report = _simulated(own, simulation, study, world, progress)
+        if out is not None and place is not None:
+            written = write_simulated(folder / DATABASE, study.name, place, simulation.command())
+            report["files"] = {(out / file).as_posix(): count for file, count in written.items()}
+    return report
+
+
+def _simulated(
+    url: str, simulation: Simulation, study: Study, world: World, progress: Progress
+) -> dict[str, Any]:
+    began_s = time.monotonic()
+    try:
+        asyncio.run(_all(url, simulation, study, world, progress))
+    finally:
+        world.thinks.shutdown()
     return world.figures.report(asdict(simulation), time.monotonic() - began_s)
 
 
@@ -89,7 +121,7 @@ def _world(workspace: Workspace, study: Study, simulation: Simulation) -> World:
     )
 
 
-async def _all(url: str, simulation: Simulation, study: Study, world: World) -> None:
+async def _all(url: str, simulation: Simulation, study: Study, world: World, progress: Progress) -> None:
     """Let everybody take part, no more than `in_flight` at a time."""
     parts = urlsplit(url)
     if parts.scheme not in ("http", "https") or not parts.netloc:
@@ -101,16 +133,28 @@ async def _all(url: str, simulation: Simulation, study: Study, world: World) -> 
             url = await stack.enter_async_context(delayed(url, simulation.delay_ms / 1000.0))
         await _reach(url)
         places = asyncio.Semaphore(simulation.in_flight)
+        over = 0
+
+        async def tell() -> None:
+            while True:
+                progress(f"ticks played {world.figures.ticks}, visits over", over, simulation.participants)
+                await asyncio.sleep(1.0)
 
         async def one(number: int) -> None:
+            nonlocal over
             rng = random.Random(f"{simulation.seed} {number}")
             async with (
                 places,
                 httpx.AsyncClient(base_url=url, follow_redirects=True, timeout=PAGE_TIMEOUT_S) as http,
             ):
                 await Participant(world, http, rng, _params(study, simulation.seed, number)).visit()
+            over += 1
 
-        await asyncio.gather(*(one(number) for number in range(simulation.participants)))
+        telling = asyncio.create_task(tell())
+        try:
+            await asyncio.gather(*(one(number) for number in range(simulation.participants)))
+        finally:
+            telling.cancel()
 
 
 async def _reach(url: str) -> None:
@@ -136,30 +180,29 @@ def _params(study: Study, seed: int, number: int) -> dict[str, str]:
 
 
 @contextmanager
-def own_server(workspace: Workspace, study: str) -> Iterator[str]:
-    """The URL of a server in a process of its own, with a database that is gone when the block ends.
+def own_server(workspace: Workspace, study: str, folder: Path) -> Iterator[str]:
+    """The URL of a server in a process of its own until the block ends; its records are kept in `folder`.
 
     Raises:
         GalleyError: it does not start; with what it said.
     """
-    with tempfile.TemporaryDirectory(prefix="galley-simulate-") as folder:
-        log = Path(folder) / "log"
-        command = [sys.executable, "-c", "from galley.cli import main; main()", "serve", str(workspace.path)]
-        command += ["--study", study, "--port", "0", "--database", str(Path(folder) / "simulated.sqlite")]
-        with (
-            log.open("wb") as out,
-            subprocess.Popen(  # noqa: S603
-                command, stdout=out, stderr=subprocess.STDOUT, env={**os.environ, **UNLIMITED}
-            ) as process,
-        ):
+    log = folder / "log"
+    command = [sys.executable, "-c", "from galley.cli import main; main()", "serve", str(workspace.path)]
+    command += ["--study", study, "--port", "0", "--database", str(folder / DATABASE)]
+    with (
+        log.open("wb") as out,
+        subprocess.Popen(  # noqa: S603
+            command, stdout=out, stderr=subprocess.STDOUT, env={**os.environ, **UNLIMITED}
+        ) as process,
+    ):
+        try:
+            yield _address(process, log)
+        finally:
+            process.terminate()
             try:
-                yield _address(process, log)
-            finally:
-                process.terminate()
-                try:
-                    process.wait(STOP_WITHIN_S)
-                except subprocess.TimeoutExpired:
-                    process.kill()
+                process.wait(STOP_WITHIN_S)
+            except subprocess.TimeoutExpired:
+                process.kill()
 
 
 def _address(process: subprocess.Popen[bytes], log: Path) -> str:

@@ -45,9 +45,11 @@ Times ending in `_ms` are milliseconds since 1970-01-01 UTC by the server's cloc
 """
 
 
-def dictionary_markdown() -> str:
-    """The data dictionary as Markdown: every exported file, then every table."""
-    return "\n".join([_INTRO, *_sheets(), _TABLES, *_tables()])
+def dictionary_markdown(notice: str = "") -> str:
+    """The data dictionary as Markdown: a notice under its title, every exported file, then every table."""
+    title, _, rest = _INTRO.partition("\n\n")
+    intro = "\n\n".join([title, notice, rest]) if notice else _INTRO
+    return "\n".join([intro, *_sheets(), _TABLES, *_tables()])
 
 
 def dictionary_csv() -> str:

@@ -63,12 +63,17 @@ class _Copies:
 
 
 def export_study(
-    store: Store, study: str, out: Path, formats: Sequence[str] = ("csv",), include_test: bool = False
+    store: Store,
+    study: str,
+    out: Path,
+    formats: Sequence[str] = ("csv",),
+    include_test: bool = False,
+    notice: str = "",
 ) -> dict[str, int]:
     """Rows written per file name, after writing the study's records to the folder `out`.
 
     Everything is read from the database as it stood at the start, however long the export takes. Visits made
-    to try the study out are left out unless `include_test`.
+    to try the study out are left out unless `include_test`. The data dictionary begins with the `notice`.
 
     Raises:
         GalleyError: nobody visited the study, a format is unknown or lacks its library, or the folder cannot
@@ -93,7 +98,7 @@ def export_study(
                 flagged = flags(connection, study)
                 for visit in queries.visits(connection, study, tests=include_test):
                     _Visit(connection, visit, files, wide, flagged.get(visit.id, ())).write()
-            write_whole(out / "data-dictionary.md", dictionary_markdown())
+            write_whole(out / "data-dictionary.md", dictionary_markdown(notice))
             write_whole(out / "data-dictionary.csv", dictionary_csv())
         except OSError as error:
             raise GalleyError(f"{out}: {error.strerror or error}; name another folder with --out") from None

@@ -19,12 +19,16 @@ HIDDEN_S: Final = 60.0
 # Two ticks of 150 ms: what the person sees is that much behind what the kitchen does.
 SLOW_RTT_MS: Final = 300.0
 
+SIMULATED: Final = "simulated-"
+"""Begins the name of a participant who was not there, in an export of a simulation."""
+
 FLAGS: Final = {
     "late_agent": "the agent was late or at fault in more than 1% of the ticks played",
     "hidden_tab": "the page was hidden for more than a minute in all",
     "failed_checks": "an attention check was not answered as expected",
     "no_id": "the link held a placeholder where the recruiter should have put a person's id",
     "interrupted": "the visit ended early because a file that it needs was changed or removed",
+    "simulated": "nobody was there: galley simulate made the visit",
     "clock_set_back": "the clock was set back while the visit ran: some of its durations are missing",
     "slow_client": "in some round, half of all round trips took more than 300 ms",
 }
@@ -48,7 +52,7 @@ def flags(
     if not tests:
         these = these & ~VISITS.c.test
     found: dict[int, list[Flag]] = defaultdict(list)
-    for rule in (_late, _hidden, _failed, _unnamed, _interrupted, _set_back, _slow):
+    for rule in (_late, _hidden, _failed, _unnamed, _interrupted, _simulated, _set_back, _slow):
         for visit, flag in rule(connection, these):
             found[visit].append(flag)
     return {visit: tuple(of_visit) for visit, of_visit in sorted(found.items())}
@@ -105,6 +109,12 @@ def _interrupted(connection: Connection, these: ColumnElement[bool]) -> Found:
     query = select(VISITS.c.id).where(these, VISITS.c.status == "interrupted")
     for visit in connection.execute(query).scalars():
         yield visit, Flag("interrupted", 1.0, "a file that it needs was changed or removed")
+
+
+def _simulated(connection: Connection, these: ColumnElement[bool]) -> Found:
+    query = select(VISITS.c.id).where(these, VISITS.c.participant.startswith(SIMULATED))
+    for visit in connection.execute(query).scalars():
+        yield visit, Flag("simulated", 1.0, "made by galley simulate")
 
 
 def _set_back(connection: Connection, these: ColumnElement[bool]) -> Found:
