@@ -40,6 +40,13 @@ def test_the_wheel_holds_code_frontend_and_starter_workspace(wheel: Path) -> Non
     assert not [name for name in names if name.startswith(("tests/", "backend/", "benchmarks/"))]
 
 
+def write_own_catalogue(lab: Path) -> None:
+    """Row D4: `locale/LANGUAGE.po` of a workspace stands over the catalogue in the wheel."""
+    (lab / "locale").mkdir()
+    text = 'msgid ""\nmsgstr "Content-Type: text/plain; charset=utf-8\\n"\n\nmsgid "Begin"\nmsgstr "开工"\n'
+    (lab / "locale" / "zh.po").write_text(text, encoding="utf-8")
+
+
 def test_the_installed_wheel_makes_a_workspace_and_serves_it_without_pytorch(
     wheel: Path, tmp_path: Path
 ) -> None:
@@ -61,10 +68,15 @@ def test_the_installed_wheel_makes_a_workspace_and_serves_it_without_pytorch(
     lab = tmp_path / "lab"
     subprocess.run([*START, "init", str(lab)], check=True, env=environment, cwd=tmp_path, capture_output=True)
     assert (lab / "studies" / "demo.yaml").is_file()
+    write_own_catalogue(lab)
     with served(lab, f"sqlite:///{tmp_path}/records.sqlite", environment=environment) as server:
         with urllib.request.urlopen(f"{server.url}/s/demo", timeout=30) as answer:
             page = answer.read().decode()
+        with urllib.request.urlopen(f"{server.url}/s/demo?language=zh", timeout=30) as answer:
+            chinese = answer.read().decode()
         with urllib.request.urlopen(f"{server.url}/healthz", timeout=30) as answer:
             assert answer.status == 200
     assert "Begin" in page
+    assert "开工" in chinese
+    assert "游戏就在这个窗口中进行" in chinese
     assert str(ROOT) not in page
