@@ -18,8 +18,8 @@ def erase(
 ) -> None:
     """Erase everything kept of one participant, down to the database's files.
 
-    Exports of all others stay as they were. A server that is running keeps its SQLite file to itself: erase
-    on its researcher's pages then.
+    One that was interrupted is finished when it is asked for again. Exports of all others stay as they were.
+    A server that is running keeps its SQLite file to itself: erase on its researcher's pages then.
     """
     from galley.records.store.erase import erase_participant
     from galley.records.store.store import Store
@@ -29,4 +29,5 @@ def erase(
         typer.confirm(f"Erase participant {participant} for good?", abort=True)
     with Store.open(database or Workspace(workspace).database, must_exist=True, serving=True) as store:
         gone = erase_participant(store, participant)
-    typer.echo(f"{participant} was erased: visits={gone.visits} rounds={gone.rounds}")
+    told = "was erased before, now from the database's files too" if gone.before else "was erased"
+    typer.echo(f"{participant} {told}: visits={gone.visits} rounds={gone.rounds}")

@@ -19,6 +19,7 @@ from fastapi import FastAPI
 from galley.errors import GalleyError
 from galley.records import Store
 from galley.records.reading.overdue import under_way
+from galley.records.store.erase import finish_erasures
 from galley.server.app import create_app
 from galley.server.changed_files import kept_by, told_of_changes
 from galley.server.content import load_content
@@ -90,6 +91,7 @@ def _serve(workspace: Workspace, settings: Settings, database: str, *, preview: 
     log = log_to(sys.stderr, settings.log_level)
     try:
         with Store.open(database, serving=True) as store:
+            finish_what_was_begun(store)
             known = replace(
                 settings, reached_at=settings.reached_at or reached_at(listening, store.engine.url)
             )
@@ -114,6 +116,17 @@ def _serve(workspace: Workspace, settings: Settings, database: str, *, preview: 
         listening.close()
         logging.getLogger().removeHandler(log)
         log.close()
+
+
+def finish_what_was_begun(store: Store) -> None:
+    """Finish erasures that were interrupted; where somebody reads the old pages, the next start does."""
+    try:
+        finished = finish_erasures(store)
+    except GalleyError as error:
+        LOG.warning("an erasure that was interrupted could not be finished: %s", error)
+        return
+    if finished:
+        LOG.warning("finished erasures that were interrupted: %d", finished)
 
 
 def server_config(app: FastAPI, settings: Settings) -> uvicorn.Config:

@@ -198,6 +198,7 @@ def test_right_answers_that_were_kept_as_wrong_are_mended(empty: Database, tmp_p
         "UPDATE responses SET passed = false WHERE item = 'q0' AND step_id = 'comparison'",
         'UPDATE attempts SET wrong = \'["q0", "q1"]\'',
         "DELETE FROM questions WHERE item LIKE 'subscale.%'",
+        "DROP TABLE erasures",
         "UPDATE alembic_version SET version_num = '0004'",
     ]
     engine = connect(database_url(empty.url), writes=True)

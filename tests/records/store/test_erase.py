@@ -21,11 +21,13 @@ from galley.records.reading import overview
 from galley.records.reading.verify import verify_study
 from galley.records.store import erase
 from galley.records.store.erase import Erased, erase_participant
+from galley.server.run import finish_what_was_begun
 from tests import postgres
 from tests.records.databases import Database
 from tests.records.export.test_study_export import AFTER, COMPARE, answer
 from tests.records.helpers import START_MS, begin, joint_actions, one_soup, open_round, plan, play
 from tests.records.store.test_rounds import finish, shared
+from tests.serving import run_galley
 
 SECRET = "kohlrabi"
 
@@ -197,6 +199,7 @@ def test_a_reader_that_does_not_end_is_told(tmp_path: Path, monkeypatch: pytest.
             assert overview.visit(connection, visit.id) is not None
             with pytest.raises(GalleyError, match="another program keeps reading"):
                 erase_participant(store, visit.participant)
+        assert erase_participant(store, visit.participant) == Erased(1, 0, before=True)
         with pytest.raises(GalleyError, match="no participant"):
             erase_participant(store, visit.participant)
         assert not any(visit.participant.encode() in content for content in files(tmp_path).values())
@@ -226,3 +229,58 @@ def test_rounds_are_journalled_while_somebody_is_erased(store: Store) -> None:
     health = store.health()
     assert (health.ok, health.lost_rows) == (True, 0)
     assert len(written) > 0
+
+
+def interrupted(store: Store, name: str = SECRET) -> VisitRow:
+    """Somebody whose erasure was killed after the rows were gone."""
+    visit = person(store, name)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(erase, "finish_erasures", lambda store: 0)
+        assert erase_participant(store, visit.participant) == Erased(1, 2)
+    return visit
+
+
+def test_a11_an_erasure_that_was_killed_before_the_files_were_rewritten_is_finished(
+    store: Store, database: Database
+) -> None:
+    visit = interrupted(store)
+    assert len(database.rows("SELECT * FROM erasures")) == 1
+    assert visit.participant not in str(database.rows("SELECT * FROM erasures"))
+    assert erase_participant(store, visit.participant) == Erased(1, 2, before=True)
+    assert database.rows("SELECT * FROM erasures") == []
+    with pytest.raises(GalleyError, match="no participant"):
+        erase_participant(store, visit.participant)
+    with pytest.raises(GalleyError, match="no participant"):
+        erase_participant(store, "somebody else")
+
+
+def test_a11_the_next_erasure_finishes_those_before_it(tmp_path: Path) -> None:
+    with Store.open(tmp_path / "galley.sqlite") as store:
+        killed, other = interrupted(store), person(store, "ada")
+        assert any(killed.participant.encode() in content for content in files(tmp_path).values())
+        erase_participant(store, other.participant)
+        assert not any(SECRET.encode() in content for content in files(tmp_path).values())
+        assert not any(killed.participant.encode() in content for content in files(tmp_path).values())
+
+
+def test_a11_the_command_says_what_it_finished(tmp_path: Path) -> None:
+    database = tmp_path / "galley.sqlite"
+    with Store.open(database) as store:
+        visit = interrupted(store)
+    command = ("erase", visit.participant, "--yes", "--database", database)
+    done = run_galley(*command)
+    told = f"{visit.participant} was erased before, now from the database's files too: visits=1 rounds=2\n"
+    assert (done.returncode, done.stdout, done.stderr) == (0, told, "")
+    assert not any(SECRET.encode() in content for content in files(tmp_path).values())
+    assert run_galley(*command).returncode == 1
+
+
+def test_a11_a_server_that_starts_finishes_it(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    with Store.open(tmp_path / "galley.sqlite", serving=True) as store:
+        interrupted(store)
+        finish_what_was_begun(store)
+        assert "finished erasures that were interrupted: 1" in caplog.text
+        assert not any(SECRET.encode() in content for content in files(tmp_path).values())
+        caplog.clear()
+        finish_what_was_begun(store)
+        assert caplog.text == ""

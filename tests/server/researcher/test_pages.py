@@ -18,7 +18,7 @@ from galley.server.researcher.downloads import DOWNLOADS
 from galley.server.researcher.export_process import write_export
 from galley.server.researcher.visit_pages import LONGEST_NOTE
 from tests.records.stored import stored_visit
-from tests.server.researcher.office import HOSTILE, NAME, START_MS, Office
+from tests.server.researcher.office import HOSTILE, NAME, START_MS, Office, csrf
 from tests.server.researcher.pilot import Pilot
 
 
@@ -213,6 +213,28 @@ def test_erasing_takes_the_name_typed_out_and_stops_the_match(fresh: Office) -> 
     assert stored_visit(fresh.store, gone.token) is None
     assert stored_visit(fresh.store, kept.token) is not None
     researcher.page(f"/visits/{gone.id}", 404)
+
+
+def test_a11_an_erasure_whose_files_were_in_use_is_finished_by_sending_the_form_again(
+    fresh: Office, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pilot = Pilot(fresh.store, fresh.workspace, fresh.study, START_MS)
+    gone = pilot.begin()
+    researcher = fresh.researcher()
+    token = csrf(researcher.page(""))
+    with monkeypatch.context() as patch:
+        patch.setattr("galley.records.store.erase.SCRUB_S", 0.2)
+        patch.setattr("galley.records.database.engine.BUSY_MS", 20)
+        with fresh.store.reading() as connection:
+            assert overview.visit(connection, gone.id) is not None
+            refused = researcher.send(f"/visits/{gone.id}/erase", token, confirm=gone.participant)
+        assert refused.status_code == 409
+        assert "erase once more" in refused.text
+    assert researcher.send(f"/visits/{gone.id}/erase", token, confirm="somebody").status_code == 404
+    done = researcher.send(f"/visits/{gone.id}/erase", token, confirm=gone.participant)
+    assert done.status_code == 200
+    assert "erased for good: visits 1" in done.text
+    assert researcher.send(f"/visits/{gone.id}/erase", token, confirm=gone.participant).status_code == 404
 
 
 def test_a_download_is_a_file_made_now(office: Office) -> None:

@@ -396,3 +396,12 @@ TEST_LINKS = Table(
         "meaning": "one row per link with which researchers walk a study that runs, without counting in it"
     },
 )
+
+ERASURES = Table(
+    "erasures",
+    METADATA,
+    _of("name_sha256", String(64), "hash of the erased participant's name", primary_key=True),
+    _of("visits", Integer, "visits that were erased"),
+    _of("rounds", Integer, "rounds that were erased"),
+    info={"meaning": "one row per erasure of which something may still be in the database's files"},
+)

@@ -128,7 +128,7 @@ class RoundExport:
             "started_utc": self.ticks[0]["deadline_ms"] if self.ticks else None,
             "ended_utc": row.ended_ms,
             "pauses": len(self.pauses),
-            "paused_s": sum(paused),
+            "paused_s": sum(paused, 0.0),
             "late_ticks": sum(tick["late"] for tick in self.ticks),
             "fault_ticks": sum(tick["fault"] is not None for tick in self.ticks),
             "lateness_median_ms": _quantile(lateness, 0.5),

@@ -11,7 +11,7 @@ from fastapi.responses import RedirectResponse, Response
 from galley.errors import GalleyError
 from galley.records.reading import overview
 from galley.records.rows import SessionRow
-from galley.records.store.erase import erase_participant
+from galley.records.store.erase import erase_participant, is_unfinished
 from galley.server.researcher.login import HOME, NEVER_CACHED, Form, first
 from galley.server.researcher.page_context import PageContext, number
 
@@ -44,21 +44,26 @@ class VisitPages:
     async def erase(self, request: Request, session: SessionRow, form: Form) -> Response:
         """Erase the participant for good, once their name was typed as it stands there."""
         visit_id = number(request, "visit")
-        found = await self._found(visit_id)
+        found, typed = await self._found(visit_id), first(form, "confirm").strip()
+        if found is None and await self._context.read(lambda connection: is_unfinished(connection, typed)):
+            return await self._erased(session, typed)
         if found is None:
             return self._context.missing(session, "visit")
-        if first(form, "confirm").strip() != found.participant:
+        if typed != found.participant:
             problem = f"Nothing was erased. To erase this participant, type {found.participant} exactly."
             return await self._page(visit_id, session, 422, erase_problem=problem)
         store, now_ms = self._context.store, self._context.clock.ms()
         # A visit that is over cannot take up its round again between the match's end and the erasing.
         await asyncio.wrap_future(store.end_visit(visit_id, "expired", now_ms))
         await self._context.stop_visit(visit_id)
+        return await self._erased(session, found.participant)
+
+    async def _erased(self, session: SessionRow, participant: str) -> Response:
         try:
-            erased = await asyncio.to_thread(erase_participant, store, found.participant)
+            erased = await asyncio.to_thread(erase_participant, self._context.store, participant)
         except GalleyError as error:
             return self._context.logins.plain(session, 409, "Not erased", f"{error}.")
-        told = f"{found.participant} was erased for good: visits {erased.visits}, rounds {erased.rounds}."
+        told = f"{participant} was erased for good: visits {erased.visits}, rounds {erased.rounds}."
         return self._context.logins.plain(session, 200, "Erased", told)
 
     async def _found(self, visit_id: int) -> Any:
