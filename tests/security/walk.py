@@ -23,6 +23,8 @@ CLASSES: dict[str, str] = {
     "GET /s/{study}/begin": OPEN,
     "HEAD /s/{study}/begin": OPEN,
     "POST /s/{study}/begin": OPEN,
+    "GET /pictures/{name}": OPEN,
+    "HEAD /pictures/{name}": OPEN,
     "MOUNT /static": OPEN,
     "GET /v/{token}": TOKEN,
     "HEAD /v/{token}": TOKEN,

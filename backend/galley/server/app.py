@@ -37,6 +37,8 @@ from galley.workspace import frontend_folder
 
 LOG = logging.getLogger(__name__)
 STATIC_KEPT_S = 300
+KEPT_FOR_GOOD = {"cache-control": "public, max-age=31536000, immutable"}
+"""A picture's name tells its content."""
 
 WRONG = mark("Something went wrong")
 NOT_POSSIBLE = mark("Not possible")
@@ -111,6 +113,14 @@ def create_app(content: Content, store: Store, settings: Settings, *, preview: b
         )
     )
     app.add_api_websocket_route("/v/{token}/play", play.endpoint)
+    shown = {picture.name: picture for study in studies.values() for picture in study.pictures}
+
+    async def picture(name: str) -> Response:
+        if name not in shown:
+            raise HTTPException(404)
+        return Response(shown[name].content, media_type=shown[name].media_type, headers=KEPT_FOR_GOOD)
+
+    app.add_api_route("/pictures/{name}", picture, methods=["GET", "HEAD"], response_model=None)
     app.mount("/static", Static(directory=frontend), name="static")
     if settings.requests_per_s:
         app.add_middleware(PerAddress, per_s=settings.requests_per_s)

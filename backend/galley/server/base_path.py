@@ -12,6 +12,7 @@ from typing import Any, Final
 
 import jinja2
 from jinja2.ext import Extension
+from markupsafe import Markup
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -20,7 +21,7 @@ from galley.errors import GalleyError
 
 HEADER: Final = "x-forwarded-prefix"
 PATH: Final = re.compile(r"(/[A-Za-z0-9_~-][A-Za-z0-9._~-]*)+")
-OWN: Final = ("s", "v", "static", "researcher", "healthz")
+OWN: Final = ("s", "v", "static", "pictures", "researcher", "healthz")
 ATTRIBUTES: Final = (
     "href|src|action|data-socket|data-next|data-sprites|data-poll|data-away|data-url|data-live"
 )
@@ -34,6 +35,11 @@ def at(path: Any) -> Any:
     """A path of the site as browsers ask for it; whole URLs and places in a page stay as they are."""
     text = str(path)
     return f"{_BASE.get()}{text}" if text.startswith("/") and not text.startswith("//") else path
+
+
+def _prose(html: str) -> Markup:
+    """The HTML of a text, whose pictures of its own are paths of the site."""
+    return Markup(html.replace(' src="/pictures/', f' src="{_BASE.get()}/pictures/'))  # noqa: S704 - made by us
 
 
 def site(request: Request) -> str:
@@ -62,6 +68,7 @@ class Paths(Extension):
     def __init__(self, environment: jinja2.Environment) -> None:
         super().__init__(environment)
         environment.filters["at"] = at
+        environment.filters["prose"] = _prose
         environment.globals["base_path"] = _BASE.get
 
     def preprocess(self, source: str, name: str | None, filename: str | None = None) -> str:

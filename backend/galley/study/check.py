@@ -8,6 +8,7 @@ from galley.errors import InvalidFiles, Problem
 from galley.study.describe import describe
 from galley.study.study import known_layouts_of, load_study
 from galley.study.written.named_files import catalogue_problems
+from galley.study.written.pictures import SUFFIXES
 from galley.study.written.questionnaire import load_questionnaire
 from galley.study.written.recruitment import load_invitations
 from galley.study.written.texts import load_text
@@ -78,6 +79,8 @@ def _misplaced(workspace: Workspace) -> Iterator[Problem]:
             if path.is_dir() or path.name.startswith("."):
                 continue
             shown = workspace.shown(path)
+            if kind == "texts" and path.suffix.lower() in SUFFIXES:
+                continue
             if path.suffix != suffix:
                 fix = f"rename it to {path.stem}{suffix}, or move it elsewhere"
                 yield Problem(shown, None, f"only {suffix} files are read here", fix)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -19,6 +19,7 @@ from galley.study.written.named_files import (
     known_layouts_of,
     text_file,
 )
+from galley.study.written.pictures import Picture
 from galley.study.written.questionnaire import Questionnaire, load_questionnaire, why_not_in
 from galley.study.written.recruitment import Ending, filled, kept, load_invitations
 from galley.study.written.study_file import StudyFile, names_of
@@ -84,6 +85,13 @@ class Study:
     def texts(self) -> Mapping[str, PageText]:
         """Every text, with the numbers that visits meet."""
         return self.quoted.texts
+
+    @property
+    def pictures(self) -> Iterator[Picture]:
+        """Every picture of its own on its texts, in all languages; one may come several times."""
+        for study in self.translations.values():
+            for text in study.texts.values():
+                yield from text.pictures
 
     @property
     def agents(self) -> tuple[str, ...]:

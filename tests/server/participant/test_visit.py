@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from concurrent.futures import Future
 from pathlib import Path
@@ -259,6 +260,24 @@ def test_f14_a_page_takes_the_longest_answers_that_it_allows(tmp_path: Path) -> 
         row = stored_visit(served.store, person.token)
         assert row is not None
         assert stored_answers(served.store, row.id)["survey"] == answers
+
+
+def test_f23_a_picture_of_the_study_is_served(tmp_path: Path) -> None:
+    workspace = study_workspace(tmp_path / "lab", ASKED.replace("long-answers", "before-game"))
+    content = b"\x89PNG\r\n\x1a\n" + bytes(100)
+    (workspace.folder("texts") / "logo.png").write_bytes(content)
+    (workspace.folder("texts") / "consent.md").write_text("# Welcome\n\n![Our logo](logo.png)\n")
+    with serving(workspace, tmp_path / "records.sqlite", base_path="/kitchen") as served:
+        person = Participant(served)
+        found = re.search(
+            r'<img [^>]*src="/kitchen(/pictures/[0-9a-f]{32}\.png)" alt="Our logo"', person.page.text
+        )
+        assert found is not None
+        picture = served.client().get(found[1])
+        assert (picture.content, picture.headers["content-type"]) == (content, "image/png")
+        assert picture.headers["x-content-type-options"] == "nosniff"
+        assert "immutable" in picture.headers["cache-control"]
+        assert served.client().get("/pictures/logo.png").status_code == 404
 
 
 def test_forms_of_other_sites_are_not_used(served: Served) -> None:

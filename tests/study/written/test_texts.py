@@ -97,8 +97,8 @@ XQ
             "dish dishes onion onions pot ready serving soup tomato ... (13 in all)"
         ),
         (
-            "page.md:7: picture 'https://example.org/x.png' does not come with Galley; "
-            "use kitchen:LAYOUT or tile:NAME"
+            "page.md:7: picture 'https://example.org/x.png' is no name of a file beside this text; "
+            "put the picture beside it and write its name; or use kitchen:LAYOUT or tile:NAME"
         ),
         "page.md:11: this row of the drawing has 2 tiles, the first 3; make all rows equally long",
         "page.md:11: tile 'Q' is unknown; use one of X P O T D S 1 2",
@@ -112,3 +112,48 @@ def test_an_empty_or_unreadable_text_is_told(tmp_path: Path) -> None:
         load_text(tmp_path / "page.md", "page.md", GRIDS)
     with pytest.raises(InvalidFiles, match="cannot be read"):
         load_text(tmp_path / "none.md", "none.md", GRIDS)
+
+
+PNG = b"\x89PNG\r\n\x1a\n" + bytes(20)
+
+
+def test_f23_a_picture_beside_the_text_is_shown_by_its_content(tmp_path: Path) -> None:
+    (tmp_path / "logo.png").write_bytes(PNG)
+    text = "# How to cook\n\n![The university's logo](logo.png)\n"
+    page = read(tmp_path, text)
+    (picture,) = page.pictures
+    assert (picture.media_type, picture.content) == ("image/png", PNG)
+    assert f'src="{picture.path}"' in page.html
+    assert 'alt="The university&#x27;s logo"' in page.html
+    (tmp_path / "logo.png").write_bytes(PNG + b"1")
+    again = read(tmp_path, text)
+    assert again.pictures[0].path != picture.path
+    assert again.sha256 != page.sha256  # what people agreed to is another page
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "told"),
+    [
+        ("gone.png", None, "page.md:3: picture 'gone.png' cannot be read (No such file or directory)"),
+        ("logo.svg", b"<svg/>", "page.md:3: picture 'logo.svg' is of a kind that is not shown"),
+        ("logo.png", b"<html><script>", "page.md:3: file 'logo.png' is no picture"),
+        ("logo.png", PNG + bytes(3 * 2**20), "page.md:3: picture 'logo.png' has 3.0 MiB"),
+        ("../logo.png", PNG, "page.md:3: picture '../logo.png' is no name of a file beside this text"),
+        ("https://evil.example/x.png", None, "page.md:3: picture 'https://evil.example/x.png' is no name"),
+        ("/etc/logo.png", None, "page.md:3: picture '/etc/logo.png' is no name"),
+    ],
+)
+def test_f23_what_is_no_small_picture_beside_the_text_is_refused(
+    tmp_path: Path, name: str, content: bytes | None, told: str
+) -> None:
+    folder = tmp_path / "texts"
+    folder.mkdir()
+    if content is not None:
+        (folder / name).write_bytes(content)
+    assert any(one.startswith(told) for one in refused(folder, f"# T\n\n![Logo]({name})\n"))
+
+
+def test_f23_a_jpeg_named_png_is_served_as_what_it_is(tmp_path: Path) -> None:
+    (tmp_path / "photo.png").write_bytes(b"\xff\xd8\xff\xe0 and so on")
+    (picture,) = read(tmp_path, "# T\n\n![Photo](photo.png)\n").pictures
+    assert (picture.media_type, picture.name.rpartition(".")[2]) == ("image/jpeg", "jpeg")

@@ -11,6 +11,7 @@ from pathlib import Path
 from galley.errors import InvalidFiles, Problem
 from galley.kitchen import Layout
 from galley.kitchen.layout_file import load_layout, load_layouts
+from galley.study.written.pictures import picture_files
 from galley.study.written.study_file import StudyFile, names_of
 from galley.translations import Catalogues
 from galley.workspace import Workspace
@@ -63,11 +64,13 @@ def content_sha256(workspace: Workspace, name: str, config: StudyFile, layouts: 
     )
     spoken = {code.partition("-")[0] for code in config.languages}
     catalogues = workspace.folder("catalogues").glob("*.po")
+    known = {text for text in texts if text is not None}
     files = {
         *(file for file in catalogues if re.split("[-_]", file.stem)[0] in spoken),
         workspace.find("studies", name),
         *(workspace.find("questionnaires", name) for name in names_of(config, "questionnaires")),
-        *(text for text in texts if text is not None),
+        *known,
+        *(picture for text in known for picture in picture_files(text)),
         *(workspace.find("layouts", layout.name) for layout in layouts),
     }
     total = hashlib.sha256()

@@ -16,6 +16,7 @@ from markdown_it.token import Token
 
 from galley.errors import InvalidFiles, Problem
 from galley.names import name_fix
+from galley.study.written.pictures import Picture, PictureError, load_picture
 
 TILES: Final[Mapping[str, str]] = {
     " ": "floor",
@@ -47,12 +48,14 @@ Grids = Mapping[str, Sequence[str]]
 
 @dataclass(frozen=True)
 class PageText:
-    """A page of text: `title` is its first heading, `html` the rest, `sha256` that of the words as shown."""
+    """A page of text: `title` is its first heading, `html` the rest, `sha256` that of what is shown."""
 
     name: str
     title: str
     html: str
     sha256: str
+    pictures: tuple[Picture, ...] = ()
+    """The pictures of the study's own on it."""
 
 
 def load_text(
@@ -61,7 +64,8 @@ def load_text(
     """The page in a Markdown file, with `values` in the places of `{minutes}` and the like (0 if not given).
 
     HTML in the file is shown as text, never passed on. `![words](kitchen:LAYOUT)` and a fenced block
-    `kitchen` with an ASCII drawing become pictures of a kitchen, `![words](tile:NAME)` one of a thing.
+    `kitchen` with an ASCII drawing become pictures of a kitchen, `![words](tile:NAME)` one of a thing,
+    `![words](FILE.png)` one of the study's own that lies beside the text.
     Without `grids` no layout is known, and none that is named counts as unknown.
 
     Raises:
@@ -75,22 +79,26 @@ def load_text(
     except UnicodeDecodeError:
         problem = Problem(shown, None, "the text is not UTF-8", "save the file as UTF-8")
         raise InvalidFiles([problem]) from None
-    page = _Page(shown, grids)
+    page = _Page(shown, grids, path.parent)
     text = page.fill_in(source, values or {})
     tokens = page.parse(text)
     title, body = page.split(tokens)
     if page.problems:
         raise InvalidFiles(page.problems)
     html = page.markdown.renderer.render(body, page.markdown.options, {"grids": grids or {}})
-    return PageText(path.stem, title, html, hashlib.sha256(text.encode()).hexdigest())
+    seen = "".join([text, *page.pictures])  # a picture's name tells its content
+    pictures = tuple(page.pictures.values())
+    return PageText(path.stem, title, html, hashlib.sha256(seen.encode()).hexdigest(), pictures)
 
 
 class _Page:
     """One file on its way to HTML, and what is wrong with it."""
 
-    def __init__(self, shown: str, grids: Grids | None) -> None:
+    def __init__(self, shown: str, grids: Grids | None, folder: Path) -> None:
         self.shown = shown
         self.grids = grids
+        self.folder = folder
+        self.pictures: dict[str, Picture] = {}
         self.problems: list[Problem] = []
         self.markdown = MarkdownIt("commonmark", {"html": False}).enable("table")
         self.markdown.add_render_rule("image", _render_image)
@@ -156,8 +164,13 @@ class _Page:
             if name not in PICTURES:
                 self.tell(line, f"no picture is named '{name}'", name_fix(name, PICTURES))
         else:
-            fix = "use kitchen:LAYOUT or tile:NAME"
-            self.tell(line, f"picture '{token.attrGet('src')}' does not come with Galley", fix)
+            try:
+                picture = load_picture(self.folder, str(token.attrGet("src")))
+            except PictureError as error:
+                self.tell(line, str(error), error.fix)
+                return
+            self.pictures[picture.name] = picture
+            token.attrSet("src", picture.path)
 
 
 def _render_image(renderer: RendererHTML, tokens: Sequence[Token], idx: int, options: Any, env: Any) -> str:
@@ -165,6 +178,8 @@ def _render_image(renderer: RendererHTML, tokens: Sequence[Token], idx: int, opt
     words = tokens[idx].content
     if scheme == "kitchen":
         return kitchen_picture(env["grids"].get(name, ()), words, name)
+    if not scheme.startswith("tile"):
+        return f'<img class="own-picture" src="{escape(scheme)}" alt="{escape(words)}">'
     return f'<span class="picture picture-{escape(name)}" role="img" aria-label="{escape(words)}"></span>'
 
 
