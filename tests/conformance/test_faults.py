@@ -13,7 +13,8 @@ from onnx import helper
 from galley.agents.network import NetworkAgent
 from galley.errors import GalleyError
 from galley.kitchen import STAY, Kitchen
-from galley.server.rounds.thinking import Mind, Question, Thinking
+from galley.server.rounds.minds import Mind, Question
+from galley.server.rounds.thinking import Thinking
 from tests.agents.policies import ROOM, bundle, model
 
 APART_X = 58

@@ -95,6 +95,11 @@ class Bundle:
                 raise InvalidFiles([self.network_problem(layout.name, str(error))]) from None
         return self._networks[layout]
 
+    def interrupt(self) -> None:
+        """Let whatever its agents' networks do just now fail soon; their next runs are as ever."""
+        for network, _ in tuple(self._networks.values()):
+            network.interrupt()
+
     def network_problem(self, layout_name: str, message: str) -> Problem:
         """A problem with the network of one layout, at its line in agent.yaml."""
         named = "" if self.layouts is None else f"{self.layouts.get(layout_name, '')}: "

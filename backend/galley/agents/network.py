@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import threading
 import time
 import weakref
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Final, Literal
+from typing import Final, Literal, TypeVar
 
 import numpy as np
 import onnxruntime as ort
@@ -20,16 +21,26 @@ from galley.errors import GalleyError
 from galley.kitchen import ACTIONS, Encoder, Layout
 
 Sampling = Literal["sample", "argmax"]
+Number = TypeVar("Number", bound=np.generic)
 
 DECISION_S: Final = 30.0
 """For so long a decision is waited for where nobody plays; then it will never come."""
 
 ACTION_COUNT = len(ACTIONS)
+MEMORY_BYTES = 2 << 30
+"""What the networks of a process may take together; a run that wants more fails, and only that."""
 _WORD = (1 << 64) - 1
 
 
 class DecisionGivenUp(GalleyError):
     """A network did not come back from a decision."""
+
+
+@functools.cache
+def _bound_memory() -> None:
+    """Give all networks of the process one bounded pool of memory."""
+    processor = ort.OrtMemoryInfo("Cpu", ort.OrtAllocatorType.ORT_ARENA_ALLOCATOR, 0, ort.OrtMemType.DEFAULT)
+    ort.create_and_register_allocator(processor, ort.OrtArenaCfg(MEMORY_BYTES, -1, -1, -1))
 
 
 class Network:
@@ -43,13 +54,16 @@ class Network:
     """
 
     def __init__(self, path: Path, shape: tuple[int, ...], limit_s: float | None = None) -> None:
+        _bound_memory()
         self.path = path
         self.shape = shape
+        self._running = ort.RunOptions()
         self._patience = None if limit_s is None else _Patience(limit_s)
         options = ort.SessionOptions()
         options.intra_op_num_threads = 1
         options.inter_op_num_threads = 1
         options.log_severity_level = 3
+        options.add_session_config_entry("session.use_env_allocators", "1")
         options.add_session_config_entry("session.intra_op.allow_spinning", "0")
         options.add_session_config_entry("session.inter_op.allow_spinning", "0")
         try:
@@ -88,7 +102,7 @@ class Network:
         patience = self._patience
         try:
             if patience is None:
-                found = self._session.run(names, feed)
+                found = self._session.run(names, feed, self._running)
             else:
                 with patience as options:
                     found = self._session.run(names, feed, options)
@@ -112,6 +126,11 @@ class Network:
         if not np.isfinite(following).all():
             raise GalleyError(f"{self.path.name}: 'state_out' holds NaN or infinite numbers")
         return logits, following
+
+    def interrupt(self) -> None:
+        """Let the runs under way, of whatever thread, fail as soon as they have done a step of theirs."""
+        running, self._running = self._running, ort.RunOptions()
+        running.terminate = True
 
     def _check(self) -> tuple[int, ...] | None:
         """The shape of the state of a recurrent policy, without batch; None for others."""
@@ -271,7 +290,7 @@ def decide(
 
     Their states (int16 [B, S]) and ticks (int64 [B]) stand one after the other, as the members do.
     """
-    seats = np.concatenate([member.seats for member in members])
+    seats = _joined([member.seats for member in members])
     logits = _logits(members, states, seats)
     barred = np.zeros(logits.shape, dtype=np.bool_)
     for member, rows in _rows(members):
@@ -279,7 +298,7 @@ def decide(
             member.unstuck.bar(states[rows], barred[rows])
     draws = None
     if members[0].sampling == "sample":
-        draws = uniform(np.concatenate([member.seeds for member in members]), seats, ticks)
+        draws = uniform(_joined([member.seeds for member in members]), seats, ticks)
     return choose(logits, barred, draws)
 
 
@@ -290,12 +309,17 @@ def _logits(
     first = members[0]
     observations = first.encoder.seat(states, seats).astype(np.float32)
     memories = [member.memories for member in members if member.memories is not None]
-    logits, following = first.network.run(observations, np.concatenate(memories) if memories else None)
+    logits, following = first.network.run(observations, _joined(memories) if memories else None)
     if following is not None:
         seen = states.copy()
         for member, rows in _rows(members):
             member.ahead = seen[rows], following[rows]
     return logits
+
+
+def _joined(parts: Sequence[NDArray[Number]]) -> NDArray[Number]:
+    """Arrays one after the other; one alone is not copied."""
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 def _rows(members: Sequence[NetworkAgents]) -> Iterator[tuple[NetworkAgents, slice]]:

@@ -29,7 +29,7 @@ from galley.server.researcher.routes import researcher_pages
 from galley.server.rounds.lobby import Lobby
 from galley.server.rounds.matches import Matches
 from galley.server.rounds.play_socket import Play
-from galley.server.rounds.thinking import Thinking
+from galley.server.rounds.thinking import ThinkingThreads
 from galley.server.settings import Settings
 from galley.server.templates import translated_templates
 from galley.translations import mark
@@ -53,7 +53,7 @@ def create_app(content: Content, store: Store, settings: Settings, *, preview: b
     """The application that serves studies and keeps what happens in a store; with `preview` all are tests."""
     studies = content.studies
     clock, rounds_clock = WakingClock(), Clock()
-    thinking = Thinking(settings.think_window_ms / 1000.0)
+    thinking = ThinkingThreads(settings.think_window_ms / 1000.0)
     has = kept_by(content.layouts, content.agents)
     visits = Visits(store, studies, clock, content.catalogues, has, preview=preview)
     matches = Matches(
@@ -68,6 +68,7 @@ def create_app(content: Content, store: Store, settings: Settings, *, preview: b
         Lobby(store, matches, visits, clock),
         store,
         clock,
+        thinking,
         environment,
         settings.max_form_kib * 1024,
         settings.begins_per_min,
@@ -88,18 +89,24 @@ def create_app(content: Content, store: Store, settings: Settings, *, preview: b
         await following.look()
         thinking.start()
         with few_collections():
-            watching = asyncio.create_task(time_limits.watch())
-            collecting = asyncio.create_task(collect_between_rounds(matches.playing))
+            beside = [
+                asyncio.create_task(work)
+                for work in (
+                    time_limits.watch(),
+                    thinking.watch(),
+                    collect_between_rounds(matches.playing),
+                )
+            ]
             following_on = asyncio.create_task(following.watch())
             try:
                 yield
             finally:
-                watching.cancel()
-                collecting.cancel()
+                for task in beside:
+                    task.cancel()
                 following_on.cancel()
                 await matches.stop()
                 await asyncio.wrap_future(store.flush())
-                thinking.stop()
+                app.state.all_ended = thinking.stop()
 
     app = FastAPI(title="Galley", docs_url=None, redoc_url=None, openapi_url=None, lifespan=lifespan)
     app.include_router(pages.router())

@@ -90,7 +90,7 @@ def _rehearse(studies: Mapping[str, Study], layouts: Mapping[str, Layout], catal
 
 
 def _play_both_seats(bundle: Bundle, layout: Layout) -> None:
-    """Play a few ticks on either seat; an agent that declares how long it may take gets that time."""
+    """Play a few ticks on either seat, in the time that the agent declares, and networks in some of ours."""
 
     def few_ticks() -> None:
         for seat in (0, 1):
@@ -98,7 +98,7 @@ def _play_both_seats(bundle: Bundle, layout: Layout) -> None:
             agents = (agent, Stay()) if seat == 0 else (Stay(), agent)
             play_episode(layout, agents, seed=0, ticks=REHEARSED_TICKS)
 
-    if bundle.think_ms is None:
+    if bundle.think_ms is None and bundle.kind != "network":  # ours, and perhaps still to be compiled
         few_ticks()
         return
     played: Future[None] = Future()
@@ -111,12 +111,13 @@ def _play_both_seats(bundle: Bundle, layout: Layout) -> None:
         else:
             played.set_result(None)
 
-    within_s = 2 * REHEARSED_TICKS * bundle.think_ms / 1000 + MADE_READY_WITHIN_S
+    within_s = 2 * REHEARSED_TICKS * (bundle.think_ms or 0) / 1000 + MADE_READY_WITHIN_S
     # A daemon: one that never answers must not keep the process from ending.
     Thread(target=attempt, name=f"galley-rehearsal-{bundle.name}", daemon=True).start()
     try:
         played.result(within_s)
     except TimeoutError:
+        bundle.interrupt()
         raise GalleyError(
             f"agents/{bundle.name}: {REHEARSED_TICKS} decisions on each seat of layout {layout.name} took "
             f"longer than {within_s:.0f} s; declare a longer think_ms, or mend the agent"

@@ -64,7 +64,7 @@ def serve(
         debug=debug,
     )
     place = Workspace(workspace)
-    _serve(place, settings, settings.database or place.database, preview=False)
+    _end(_serve(place, settings, settings.database or place.database, preview=False))
 
 
 def preview(
@@ -83,10 +83,12 @@ def preview(
     settings = read_settings(os.environ if environ is None else environ, study=study, host=host, port=port)
     with tempfile.TemporaryDirectory(prefix="galley-preview-") as folder:
         database = str(Path(folder) / "preview.sqlite")
-        _serve(Workspace(workspace), replace(settings, database=database), database, preview=True)
+        ended = _serve(Workspace(workspace), replace(settings, database=database), database, preview=True)
+    _end(ended)
 
 
-def _serve(workspace: Workspace, settings: Settings, database: str, *, preview: bool) -> None:
+def _serve(workspace: Workspace, settings: Settings, database: str, *, preview: bool) -> bool:
+    """Serve until stopped; whether every agent stopped too."""
     listening = listen(settings)
     log = log_to(sys.stderr, settings.log_level)
     try:
@@ -111,7 +113,8 @@ def _serve(workspace: Workspace, settings: Settings, database: str, *, preview: 
                 names = (settings.study,) if settings.study else workspace.names("studies")
                 Announcing(config, settings, listening, names).run(sockets=[listening])
             except KeyboardInterrupt:
-                return
+                pass
+            return bool(getattr(app.state, "all_ended", True))
     finally:
         listening.close()
         logging.getLogger().removeHandler(log)
@@ -127,6 +130,14 @@ def finish_what_was_begun(store: Store) -> None:
         return
     if finished:
         LOG.warning("finished erasures that were interrupted: %d", finished)
+
+
+def _end(all_ended: bool) -> None:
+    """End the process at once when an agent still runs, in code that knows nothing of Python's end."""
+    if not all_ended:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(0)
 
 
 def server_config(app: FastAPI, settings: Settings) -> uvicorn.Config:

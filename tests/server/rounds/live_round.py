@@ -14,11 +14,11 @@ from galley.protocol.messages import Key, Release
 from galley.records import ClockRow, KeyRow, Lease, PauseRow, TickRow
 from galley.server.clock import Clock
 from galley.server.rounds.match import Match
+from galley.server.rounds.minds import Answer
 from galley.server.rounds.person import Person
 from galley.server.rounds.round_journal import RoundJournal, SentAt
+from galley.server.rounds.round_kitchen import caught_up
 from galley.server.rounds.round_spec import RoundSpec
-from galley.server.rounds.takeover import caught_up
-from galley.server.rounds.thinking import Answer
 
 LAYOUT = """
     XXPXX

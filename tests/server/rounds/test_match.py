@@ -10,7 +10,7 @@ import pytest
 from galley.kitchen import EAST, INTERACT, NORTH, STAY, WEST
 from galley.protocol import codec, field_kinds, messages
 from galley.server.clock import Stagger, first_deadline
-from galley.server.rounds.thinking import Answer
+from galley.server.rounds.minds import Answer
 from tests.server.rounds.live_round import TICK_S, Loop, Round, Tab, run, until_tick
 
 

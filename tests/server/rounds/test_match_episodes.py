@@ -11,7 +11,7 @@ from galley.kitchen import EAST, NORTH, STAY, WEST, Kitchen, Layout
 from galley.protocol import messages
 from galley.records import Lease, LeaseLost
 from galley.records.store.absences import MOST_ABSENCES
-from galley.server.rounds.takeover import caught_up
+from galley.server.rounds.round_kitchen import caught_up
 from tests.server.rounds.live_round import LAYOUT, Round, Tab, run, until_tick
 
 

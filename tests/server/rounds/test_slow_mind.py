@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,8 @@ import pytest
 from numpy.typing import NDArray
 
 from galley.kitchen import EAST, NORTH, STAY, WEST, Layout
-from galley.server.rounds.thinking import Mind, Question, SlowMind, Thinking
+from galley.server.rounds.minds import Mind, Question, SlowMind
+from galley.server.rounds.thinking import Thinking
 from tests.server.helpers import wait_until
 from tests.server.rounds.test_thinking import Scripted, answered
 
@@ -48,6 +49,12 @@ def stuck() -> Iterator[Stuck]:
     agent.test_is_over.set()
 
 
+def slow_mind(make: Callable[[], Any], name: str, think_ms: int, *, repeats: bool = False) -> SlowMind:
+    own = Thinking(window_s=0.0, name=f"galley-thinking-{name}")
+    own.start()
+    return SlowMind(own, make, name, think_ms, repeats=repeats)
+
+
 def action(question: Question) -> int:
     """What a round does at the deadline."""
     if question.answer is None or question.answer.action is None:
@@ -58,7 +65,7 @@ def action(question: Question) -> int:
 def test_others_decide_at_once_beside_a_slow_and_a_stuck_agent(stuck: Stuck) -> None:
     thinking = Thinking(window_s=0.0)
     thinking.start()
-    minds = [SlowMind(lambda: Sleeping(), "slow", 1000), SlowMind(lambda: stuck, "stuck", 1000)]
+    minds = [slow_mind(lambda: Sleeping(), "slow", 1000), slow_mind(lambda: stuck, "stuck", 1000)]
     try:
         late = [mind.ask(0, STATE, None) for mind in minds]
         for tick in range(20):
@@ -79,7 +86,7 @@ def test_others_decide_at_once_beside_a_slow_and_a_stuck_agent(stuck: Stuck) -> 
 def test_a_late_answer_counts_for_no_tick_unless_the_agent_repeats() -> None:
     for repeats, wanted in ((False, STAY), (True, NORTH)):
         agent = Sleeping(lambda tick: NORTH if tick == 0 else WEST)
-        mind = SlowMind(lambda agent=agent: agent, "slow", 1000, repeats=repeats)  # type: ignore[misc]
+        mind = slow_mind(lambda agent=agent: agent, "slow", 1000, repeats=repeats)  # type: ignore[misc]
         first = mind.ask(0, STATE, None)
         second = mind.ask(1, STATE, (STATE, (STAY, STAY))) if not repeats else None
         assert action(first) == STAY, "nothing is decided yet"
@@ -91,7 +98,7 @@ def test_a_late_answer_counts_for_no_tick_unless_the_agent_repeats() -> None:
 
 
 def test_what_was_decided_in_an_episode_is_not_repeated_in_the_next() -> None:
-    mind = SlowMind(lambda: Sleeping(lambda tick: NORTH), "slow", 1000, repeats=True)
+    mind = slow_mind(lambda: Sleeping(lambda tick: NORTH), "slow", 1000, repeats=True)
     old = mind.ask(0, STATE, None)
     mind.restart(LAYOUT, 0, 1)
     new = mind.ask(0, STATE, None)
@@ -105,7 +112,7 @@ def test_what_was_decided_in_an_episode_is_not_repeated_in_the_next() -> None:
 def test_a_stuck_agent_is_told_of_once_and_holds_nothing_up(
     stuck: Stuck, caplog: pytest.LogCaptureFixture
 ) -> None:
-    mind = SlowMind(lambda: stuck, "stuck", think_ms=20, repeats=True)
+    mind = slow_mind(lambda: stuck, "stuck", think_ms=20, repeats=True)
     asked = [mind.ask(0, STATE, None)]
     for tick in range(1, 8):
         time.sleep(0.02)
@@ -118,7 +125,7 @@ def test_a_stuck_agent_is_told_of_once_and_holds_nothing_up(
 
 
 def test_what_nobody_waits_for_any_more_is_dropped(stuck: Stuck) -> None:
-    mind = SlowMind(lambda: stuck, "stuck", 1000)
+    mind = slow_mind(lambda: stuck, "stuck", 1000)
     mind.ask(0, STATE, None)
     for tick in range(1, 5):
         mind.ask(tick, STATE, (STATE, (EAST, STAY)))

@@ -11,7 +11,8 @@ import pytest
 from numpy.typing import NDArray
 
 from galley.kitchen import EAST, STAY, WEST, Layout
-from galley.server.rounds.thinking import Mind, Question, Thinking
+from galley.server.rounds.minds import Mind, Question
+from galley.server.rounds.thinking import Thinking
 from tests.server.helpers import wait_until
 
 STATE = np.zeros(9, dtype=np.int16)

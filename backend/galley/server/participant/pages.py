@@ -32,6 +32,7 @@ from galley.server.participant.visits import GRACE_S, TEST_PARAM, NotBegun, Visi
 from galley.server.rounds.lobby import Lobby, Meeting
 from galley.server.rounds.matches import Matches, RoundBusy
 from galley.server.rounds.relay import RELAYED, hand_over
+from galley.server.rounds.thinking import ThinkingThreads
 from galley.study.stages.round_step import RoundStep
 from galley.study.study import Study
 from galley.study.visit.happenings import Skipped
@@ -81,6 +82,7 @@ class Pages:
         lobby: Lobby,
         store: Store,
         clock: Clock,
+        thinking: ThinkingThreads,
         templates: jinja2.Environment,
         max_form_bytes: int,
         begins_per_min: int = 0,
@@ -91,6 +93,7 @@ class Pages:
         self._lobby = lobby
         self._store = store
         self._clock = clock
+        self._thinking = thinking
         self._templates = templates
         self._max_form_bytes = max_form_bytes
         self._begins = Paces(begins_per_min / 60.0, burst=begins_per_min) if begins_per_min else None
@@ -123,11 +126,14 @@ class Pages:
         return self._page("studies.html", studies=studies, query=query, language=self.spoken_to(request))
 
     async def health(self) -> Response:
-        """Whether what happens reaches the database."""
+        """Whether what happens reaches the database, and all agents answer."""
         self._store.probe()
         health = self._store.health()
-        state = {"ok": health.ok, "rounds": len(self._matches), "rows_waiting": health.waiting_rows}
-        return JSONResponse(state, 200 if health.ok else 503, NEVER_CACHED)
+        stuck = self._thinking.stuck()
+        ok = health.ok and not stuck
+        state = {"ok": ok, "rounds": len(self._matches), "rows_waiting": health.waiting_rows}
+        agents = {"stuck": stuck, "given_up": self._thinking.given_up()}
+        return JSONResponse(state | agents, 200 if ok else 503, NEVER_CACHED)
 
     async def landing(self, request: Request, study: str) -> Response:
         """What the study is and how long it takes, with a button to begin; or why nobody can."""

@@ -17,12 +17,12 @@ from galley.records import LeaseLost, PauseRow
 from galley.records.store.absences import MOST_ABSENCES
 from galley.server.clock import Clock, Deadlines, Timer
 from galley.server.rounds.match_host import MatchHost
+from galley.server.rounds.minds import Mind, Question
 from galley.server.rounds.person import Connection, Person
 from galley.server.rounds.round_journal import Played, RoundJournal, SentAt
 from galley.server.rounds.round_kitchen import RoundKitchen
 from galley.server.rounds.round_messages import round_end, round_keyframe, round_tick
 from galley.server.rounds.round_spec import RoundSpec
-from galley.server.rounds.thinking import Mind, Question
 
 LOG = logging.getLogger(__name__)
 LEFT = "left"

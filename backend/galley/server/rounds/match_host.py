@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Protocol
 
 from galley.outcomes import RoundOutcome
+from galley.server.rounds.minds import Mind
 from galley.server.rounds.person import Person
-from galley.server.rounds.thinking import Mind
 
 if TYPE_CHECKING:
     from galley.server.rounds.match import Match

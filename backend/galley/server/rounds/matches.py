@@ -9,7 +9,6 @@ import secrets
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any
 from weakref import WeakValueDictionary
 
 from galley.agents.catalogue import Catalogue
@@ -23,13 +22,13 @@ from galley.records.store import queries
 from galley.server.clock import Clock, Stagger
 from galley.server.participant.visits import Visit, Visits
 from galley.server.rounds.match import Match
+from galley.server.rounds.minds import Mind, ready_agent
 from galley.server.rounds.person import Person
 from galley.server.rounds.round_journal import RoundJournal
-from galley.server.rounds.round_kitchen import RoundKitchen
+from galley.server.rounds.round_kitchen import RoundKitchen, caught_up
 from galley.server.rounds.round_spec import RoundSpec
 from galley.server.rounds.set_up import of_one, of_two, round_at
-from galley.server.rounds.takeover import caught_up, ready_agent
-from galley.server.rounds.thinking import Mind, SlowMind, Thinking
+from galley.server.rounds.thinking import ThinkingThreads
 from galley.study.visit.happenings import RoundEnded
 
 LOG = logging.getLogger(__name__)
@@ -80,7 +79,7 @@ class Matches:
         visits: Visits,
         catalogue: Catalogue,
         layouts: Mapping[str, Layout],
-        thinking: Thinking,
+        thinking: ThinkingThreads,
         clock: Clock,
         address: str = "",
     ) -> None:
@@ -307,7 +306,8 @@ class Matches:
             show_score=step.show_score,
             stand_in=None if step.lobby is None else step.lobby.dropout_agent,
         )
-        round_kitchen = await self._think(lambda: caught_up(layout, row.episodes, row.joint_actions))
+        catch_up = self._thinking.kitchens.do(lambda: caught_up(layout, row.episodes, row.joint_actions))
+        round_kitchen = await asyncio.wrap_future(catch_up)
         players: list[Person | Mind] = []
         stood_in = {one.seat: one for one in row.stand_ins}
         for seat in row.seats:
@@ -346,12 +346,7 @@ class Matches:
         ready = partial(
             ready_agent, bundle, round_kitchen.layout, seat, spec.seeds[round_kitchen.episode - 1], seen
         )
-        if bundle.think_ms is not None:
-            return SlowMind(ready, name, bundle.think_ms, repeats=bundle.repeats)
-        return Mind(self._thinking, await self._think(ready), name, repeats=bundle.repeats)
-
-    async def _think(self, work: Any) -> Any:
-        return await asyncio.wrap_future(self._thinking.do(work))
+        return await self._thinking.mind(bundle, ready)
 
     # ---- what a match asks for -----------------------------------------------------------------------------
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from galley.kitchen import Kitchen, Layout
+from galley.kitchen.trajectory import Trajectory, episodes_of
 
 
 class RoundKitchen:
@@ -77,3 +78,11 @@ class RoundKitchen:
         self._state_before = self.kitchen.state.copy()
         self.episode += 1
         self.kitchen = Kitchen(self.layout)
+
+
+def caught_up(layout: Layout, episodes: int, joint_actions: NDArray[np.uint8]) -> RoundKitchen:
+    """The kitchen after the joint actions (uint8 [T, 2]) of all episodes so far."""
+    round_kitchen = RoundKitchen(layout, episodes)
+    for episode in episodes_of(Trajectory(layout, joint_actions), episodes):
+        round_kitchen.take_up(episode.joint_actions)
+    return round_kitchen
