@@ -16,7 +16,7 @@ from galley.extras import EXTRA_OF
 from tests.serving import run_galley
 
 ROOT = Path(__file__).parents[1]
-HEAVY = ("numpy", "numba", "onnxruntime", "torch", "sqlalchemy", "fastapi", "pydantic", "jinja2")
+HEAVY = ("numpy", "numba", "onnxruntime", "torch", "sqlalchemy", "starlette", "pydantic", "jinja2")
 
 
 def run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:

@@ -142,7 +142,7 @@ print(*sorted({name.split(".")[0] for name in sys.modules}))
         "torch",
         "onnxruntime",
         "sqlalchemy",
-        "fastapi",
+        "starlette",
         "typer",
     }
 

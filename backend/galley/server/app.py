@@ -7,9 +7,11 @@ import logging
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
-from fastapi import FastAPI, Request
-from fastapi.responses import Response
+from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
@@ -49,7 +51,7 @@ BROKEN = mark(
 AWAY_RETRY_S = "5"
 
 
-def create_app(content: Content, store: Store, settings: Settings, *, preview: bool = False) -> FastAPI:
+def create_app(content: Content, store: Store, settings: Settings, *, preview: bool = False) -> Starlette:
     """The application that serves studies and keeps what happens in a store; with `preview` all are tests."""
     studies = content.studies
     clock, rounds_clock = WakingClock(), Clock()
@@ -85,7 +87,7 @@ def create_app(content: Content, store: Store, settings: Settings, *, preview: b
     following = Following(store, clock, rounds_clock, matches.playing)
 
     @asynccontextmanager
-    async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
+    async def lifespan(_app: Starlette) -> AsyncIterator[None]:
         await following.look()
         thinking.start()
         with few_collections():
@@ -94,41 +96,41 @@ def create_app(content: Content, store: Store, settings: Settings, *, preview: b
                 for work in (
                     time_limits.watch(),
                     thinking.watch(),
+                    following.watch(),
                     collect_between_rounds(matches.playing),
                 )
             ]
-            following_on = asyncio.create_task(following.watch())
             try:
                 yield
             finally:
                 for task in beside:
                     task.cancel()
-                following_on.cancel()
                 await matches.stop()
                 await asyncio.wrap_future(store.flush())
                 app.state.all_ended = thinking.stop()
 
-    app = FastAPI(title="Galley", docs_url=None, redoc_url=None, openapi_url=None, lifespan=lifespan)
-    app.include_router(pages.router())
-    app.include_router(
-        researcher_pages(
+    shown = {picture.name: picture for study in studies.values() for picture in study.pictures}
+
+    async def picture(request: Request) -> Response:
+        found = shown.get(request.path_params["name"])
+        if found is None:
+            raise HTTPException(404)
+        return Response(found.content, media_type=found.media_type, headers=KEPT_FOR_GOOD)
+
+    routes = [
+        *pages.routes(),
+        *researcher_pages(
             store=store,
             studies=studies,
             folder=str(frontend / "templates"),
             clock=clock,
             stop_visit=matches.stop_visit,
-        )
-    )
-    app.add_api_websocket_route("/v/{token}/play", play.endpoint)
-    shown = {picture.name: picture for study in studies.values() for picture in study.pictures}
-
-    async def picture(name: str) -> Response:
-        if name not in shown:
-            raise HTTPException(404)
-        return Response(shown[name].content, media_type=shown[name].media_type, headers=KEPT_FOR_GOOD)
-
-    app.add_api_route("/pictures/{name}", picture, methods=["GET", "HEAD"], response_model=None)
-    app.mount("/static", Static(directory=frontend), name="static")
+        ),
+        WebSocketRoute("/v/{token}/play", play.endpoint),
+        Route("/pictures/{name}", picture),
+        Mount("/static", Static(directory=frontend), name="static"),
+    ]
+    app = Starlette(routes=routes, lifespan=lifespan)
     if settings.requests_per_s:
         app.add_middleware(PerAddress, per_s=settings.requests_per_s)
     app.add_middleware(SecureHeaders, framed_by=settings.framed_by)

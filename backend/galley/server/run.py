@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import uvicorn
-from fastapi import FastAPI
+from starlette.applications import Starlette
 
 from galley.errors import GalleyError
 from galley.records import Store
@@ -140,7 +140,7 @@ def _end(all_ended: bool) -> None:
         os._exit(0)
 
 
-def server_config(app: FastAPI, settings: Settings) -> uvicorn.Config:
+def server_config(app: Starlette, settings: Settings) -> uvicorn.Config:
     """How uvicorn runs the application: small uncompressed frames, dead connections found within seconds."""
     return uvicorn.Config(
         app,

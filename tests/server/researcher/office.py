@@ -12,7 +12,8 @@ from typing import Any
 
 import httpx
 import uvicorn
-from fastapi import APIRouter, FastAPI
+from starlette.applications import Starlette
+from starlette.routing import Mount, Route
 
 from galley.records import Store, VisitRow
 from galley.records.store.researcher_accounts import Researchers
@@ -51,7 +52,7 @@ class TurnedClock(Clock):
 class Office:
     """The pages, what they stand on, and how to get in."""
 
-    pages: APIRouter
+    pages: list[Route]
     store: Store
     workspace: Workspace
     study: Study
@@ -127,7 +128,6 @@ def open_office(database: Path, workspace: Workspace, study: Study, visits: bool
 
     with Store.open(database) as store:
         Researchers(store).put(NAME, Passwords().hashed(PASSWORD), clock.ms()).result()
-        app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
         pages = researcher_pages(
             store=store,
             studies={study.name: study},
@@ -135,8 +135,7 @@ def open_office(database: Path, workspace: Workspace, study: Study, visits: bool
             clock=clock,
             stop_visit=stop_visit,
         )
-        app.include_router(pages)
-        app.mount("/static", Static(directory=frontend_folder()))
+        app = Starlette(routes=[*pages, Mount("/static", Static(directory=frontend_folder()))])
         app.add_middleware(SecureHeaders)
         office = Office(pages, store, workspace, study, clock, stopped, database)
         if visits:
@@ -146,7 +145,7 @@ def open_office(database: Path, workspace: Workspace, study: Study, visits: bool
 
 
 @contextmanager
-def _served(app: FastAPI) -> Iterator[str]:
+def _served(app: Starlette) -> Iterator[str]:
     """The URL of the application, served by a thread as `galley serve` does: a local proxy is trusted."""
     settings = Settings(port=0)
     listening = listen(settings)

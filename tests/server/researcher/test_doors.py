@@ -18,7 +18,7 @@ def every_route(office: Office) -> list[tuple[str, str]]:
     visit = office.visits["done"].id
     values = {"study": office.study.name, "visit": visit, "round": office.open_round, "kind": ""}
     found = []
-    for route in office.pages.routes:
+    for route in office.pages:
         assert isinstance(route, Route)
         values["kind"] = "gif" if "/film." in route.path else "csv"
         path = re.sub(r"\{([^}]+)\}", lambda name: str(values[name[1].split(":")[0]]), route.path)

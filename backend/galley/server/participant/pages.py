@@ -5,13 +5,14 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from typing import Any, Final
 from urllib.parse import quote, urlencode
 
 import jinja2
-from fastapi import APIRouter, Request
-from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
+from starlette.routing import Route
 
 from galley.errors import GalleyError
 from galley.records import Store
@@ -98,21 +99,21 @@ class Pages:
         self._max_form_bytes = max_form_bytes
         self._begins = Paces(begins_per_min / 60.0, burst=begins_per_min) if begins_per_min else None
 
-    def router(self) -> APIRouter:
+    def routes(self) -> list[Route]:
         """The routes of all pages."""
-        router = APIRouter()
-        shown: dict[str, Any] = {"response_class": HTMLResponse, "response_model": None}
-        router.add_api_route("/", self.home, methods=["GET", "HEAD"], **shown)
-        router.add_api_route("/healthz", self.health, methods=["GET", "HEAD"], response_model=None)
-        router.add_api_route("/s/{study}", self.landing, methods=["GET", "HEAD"], **shown)
-        router.add_api_route("/s/{study}/begin", self.begin, methods=["POST"], **shown)
-        router.add_api_route("/s/{study}/begin", self.back_to_landing, methods=["GET", "HEAD"], **shown)
-        router.add_api_route("/v/{token}", self.visit, methods=["GET", "HEAD"], **shown)
-        router.add_api_route("/v/{token}", self.submit, methods=["POST"], **shown)
-        router.add_api_route("/v/{token}/away", self.away, methods=["POST"], response_model=None)
-        router.add_api_route("/v/{token}/play", self.no_socket, methods=["GET"], response_model=None)
-        router.add_api_route("/v/{token}/lobby", self.waiting, methods=["GET"], response_model=None)
-        return router
+        table: list[tuple[str, str, Callable[..., Awaitable[Response]]]] = [
+            ("GET", "/", self.home),
+            ("GET", "/healthz", self.health),
+            ("GET", "/s/{study}", self.landing),
+            ("POST", "/s/{study}/begin", self.begin),
+            ("GET", "/s/{study}/begin", self.back_to_landing),
+            ("GET", "/v/{token}", self.visit),
+            ("POST", "/v/{token}", self.submit),
+            ("POST", "/v/{token}/away", self.away),
+            ("GET", "/v/{token}/play", self.no_socket),
+            ("GET", "/v/{token}/lobby", self.waiting),
+        ]
+        return [Route(path, _with_params(page), methods=[method]) for method, path, page in table]
 
     # ---- before a visit ------------------------------------------------------------------------------------
 
@@ -125,7 +126,7 @@ class Pages:
         studies = [public_study(study) for study in spoken]
         return self._page("studies.html", studies=studies, query=query, language=self.spoken_to(request))
 
-    async def health(self) -> Response:
+    async def health(self, _request: Request) -> Response:
         """Whether what happens reaches the database, and all agents answer."""
         self._store.probe()
         health = self._store.health()
@@ -233,7 +234,7 @@ class Pages:
             return RedirectResponse(visit.url, 303, NEVER_CACHED)
         return self._step_page(visit, partner="agent" if meeting.alone else "human")
 
-    async def waiting(self, token: str) -> Response:
+    async def waiting(self, _request: Request, token: str) -> Response:
         """Whether somebody still has to wait for a partner, and how long at most; for scripts."""
         visit = await self._visits.find(token)
         if visit is None:
@@ -393,6 +394,15 @@ class Pages:
     def _page(self, template: str, status_code: int = 200, /, **values: Any) -> Response:
         html = self._templates.get_template(template).render(**values)
         return HTMLResponse(html, status_code, NEVER_CACHED)
+
+
+def _with_params(page: Callable[..., Awaitable[Response]]) -> Callable[[Request], Awaitable[Response]]:
+    """A page that is given the parameters of its path by name."""
+
+    async def endpoint(request: Request) -> Response:
+        return await page(request, **request.path_params)
+
+    return endpoint
 
 
 def _query(request: Request) -> str:

@@ -9,8 +9,8 @@ from collections.abc import Awaitable, Callable, Mapping
 from urllib.parse import quote
 
 import jinja2
-from fastapi import Request
-from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
 
 from galley.records import Store
 from galley.records.rows import ResearcherRow, SessionRow

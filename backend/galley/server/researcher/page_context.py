@@ -9,8 +9,8 @@ from typing import Any, TypeVar
 from urllib.parse import urlencode
 
 import jinja2
-from fastapi import Request
-from fastapi.responses import HTMLResponse, Response
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, Response
 
 from galley.records import Store
 from galley.records.rows import SessionRow

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Mapping
 
-from fastapi import APIRouter
+from starlette.routing import Route
 
 from galley.records import Store
 from galley.server.clock import Clock
@@ -26,7 +26,7 @@ def researcher_pages(
     folder: str,
     clock: Clock,
     stop_visit: Callable[[int], Awaitable[None]],
-) -> APIRouter:
+) -> list[Route]:
     """The routes under /researcher. `folder` holds the templates; for the rest see PageContext."""
     environment = templates(folder)
     environment.filters |= FILTERS
@@ -35,9 +35,6 @@ def researcher_pages(
     about_studies, about_visits = StudyPages(context), VisitPages(context)
     about_rounds, files = RoundPages(context), DownloadPages(context)
 
-    router = APIRouter()
-    router.add_route(LOGIN, logins.login_page, methods=["GET"])
-    router.add_route(LOGIN, logins.login, methods=["POST"])
     pages = {
         "": about_studies.home,
         "/studies/{study}": about_studies.study,
@@ -61,10 +58,13 @@ def researcher_pages(
         "/visits/{visit:int}/notes": about_visits.note,
         "/visits/{visit:int}/erase": about_visits.erase,
     }
-    for path, page in pages.items():
-        router.add_route(f"{HOME}{path}", logins.page(page), methods=["GET"])
-    for path, page in data.items():
-        router.add_route(f"{HOME}{path}", logins.data(page), methods=["GET"])
-    for path, form_action in form_actions.items():
-        router.add_route(f"{HOME}{path}", logins.form_action(form_action), methods=["POST"])
-    return router
+    return [
+        Route(LOGIN, logins.login_page, methods=["GET"]),
+        Route(LOGIN, logins.login, methods=["POST"]),
+        *(Route(f"{HOME}{path}", logins.page(page)) for path, page in pages.items()),
+        *(Route(f"{HOME}{path}", logins.data(page)) for path, page in data.items()),
+        *(
+            Route(f"{HOME}{path}", logins.form_action(form_action), methods=["POST"])
+            for path, form_action in form_actions.items()
+        ),
+    ]

@@ -138,8 +138,9 @@ class Play:
         self._arrivals = Paces(SOCKETS_PER_S, SOCKETS_AT_ONCE)
         self._open: dict[str, list[Socket]] = {}
 
-    async def endpoint(self, websocket: WebSocket, token: str) -> None:
+    async def endpoint(self, websocket: WebSocket) -> None:
         """One connection from handshake to close; a foreign page or an unknown link gets 403."""
+        token = websocket.path_params["token"]
         now_s = asyncio.get_running_loop().time()
         if self._arrivals.of(token, now_s).wait_s(now_s, patience_s=0.0) > 0:
             await asyncio.sleep(REFUSED_AFTER_S)
