@@ -190,7 +190,7 @@ def test_mistakes_are_one_line(tmp_path: Path) -> None:
     }
     assert {name: words for name, words in wanted.items() if words not in said[name]} == {}, said
     assert all("\n" not in line for line in said.values())
-    assert not list(tmp_path.glob("*.part")) + list(tmp_path.glob(".*.part"))
+    assert not list(tmp_path.glob("*.part")) + list(tmp_path.glob(".*.galley-part"))
     assert told(source, "--out", out, "--scale", 16) == f"{out}: 13 pictures of 4 ticks"
 
 

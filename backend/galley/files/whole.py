@@ -4,22 +4,35 @@ from __future__ import annotations
 
 import os
 import shutil
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, Final
 
 from galley.errors import GalleyError
+from galley.files.scratch import Scratch, clear_parts, hold
+
+FORMER: Final = ".former"
+
+
+PART: Final = ".galley-part"
+"""Ends the name of a file that is not whole yet."""
+
+
+def clear_left(folder: Path) -> None:
+    """Remove what processes that were killed left half-written in a folder."""
+    clear_parts(folder, PART)
 
 
 @contextmanager
 def whole_path(path: Path) -> Iterator[Path]:
     """The path to write a file at, which takes the place of `path` once the block ends and it is on the disk.
 
-    After an error `path` is as it was and nothing else is left.
+    After an error `path` is as it was and nothing else is left. Of a process that was killed a file stays
+    that `clear_left` finds; who writes `path` next overwrites it.
     """
-    part = path.with_name(f".{path.name}.part")
+    part = path.with_name(f".{path.name}{PART}")
+    held = hold(part)
     try:
         yield part
         with part.open("rb") as file:
@@ -27,6 +40,7 @@ def whole_path(path: Path) -> Iterator[Path]:
         part.replace(path)
     finally:
         part.unlink(missing_ok=True)
+        os.close(held)
 
 
 @contextmanager
@@ -48,13 +62,14 @@ def whole_folder(path: Path, *, replace: bool = False, kept: bool = False) -> It
     """A folder of the name of `path` to fill, which takes its place when the block ends.
 
     It begins empty, or with all that is in `path` where that is `kept`. After an error `path` is as it was.
+    What processes left beside it that were killed meanwhile is taken away.
 
     Raises:
         GalleyError: there is a `path` already and it may not be replaced, or it cannot be put there.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    staging = Path(tempfile.mkdtemp(prefix=".part-", dir=path.parent))
-    folder, former = staging / path.name, staging / ".former"
+    scratch = Scratch(".part-", path.parent, _put_back)
+    folder, former = scratch.path / path.name, scratch.path / FORMER
     try:
         if kept and path.exists():
             shutil.copytree(path, folder)
@@ -69,4 +84,12 @@ def whole_folder(path: Path, *, replace: bool = False, kept: bool = False) -> It
                 former.rename(path)
             raise GalleyError(f"{path}: cannot be put there ({error.strerror or error})") from None
     finally:
-        shutil.rmtree(staging, ignore_errors=True)
+        scratch.close()
+
+
+def _put_back(left: Path) -> None:
+    """Put a folder back in its place that a process was killed in the middle of replacing."""
+    former = left / FORMER
+    names = [entry.name for entry in left.iterdir() if not entry.name.startswith(".")]
+    if former.is_dir() and len(names) == 1 and not (left.parent / names[0]).exists():
+        former.rename(left.parent / names[0])

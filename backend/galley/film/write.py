@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from galley.errors import GalleyError
-from galley.files.whole import whole_path
+from galley.files.whole import clear_left, whole_path
 from galley.film.footage import Footage, Reel
 
 if TYPE_CHECKING:
@@ -71,6 +71,7 @@ def write_film(footage: Footage, sprites: Path, out: Path, tile: int = USUAL_TIL
     """
     check(out, tile, speed)
     try:
+        clear_left(out.parent)
         with whole_path(out) as part:
             return _WRITERS[out.suffix.lower()](footage, sprites, part, tile, speed)
     except OSError as error:

@@ -10,7 +10,7 @@ from typing import Any
 
 from galley.errors import GalleyError
 from galley.files.lock import FileLock
-from galley.files.whole import write_whole
+from galley.files.whole import clear_left, write_whole
 from galley.runs.state_file import StateFormat
 
 
@@ -52,16 +52,20 @@ class RunFolder:
             write_whole(described, json.dumps(told, indent=2, sort_keys=True) + "\n")
 
     def lock(self, doing: str) -> FileLock:
-        """The lock without which nobody works in the folder; `doing` says what one does there.
+        """The lock without which nobody works in the folder; `doing` says what one does there. What
+        was left half-written by a run that was killed is taken away.
 
         Raises:
             GalleyError: another process holds it.
         """
-        return FileLock(
+        lock = FileLock(
             self.path / "lock",
             f"{self.path}: another process {doing} here ({{holder}}); wait for it, or name another folder "
             "with --out",
         )
+        for folder in (self.path, self.path / "members"):
+            clear_left(folder)
+        return lock
 
     def load(self) -> dict[str, Any] | None:
         """The last state that was saved, None at the beginning of a run; the log is cut back to it.

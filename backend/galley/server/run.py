@@ -7,7 +7,6 @@ import os
 import signal
 import socket
 import sys
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +16,7 @@ import uvicorn
 from starlette.applications import Starlette
 
 from galley.errors import GalleyError
+from galley.files.scratch import Scratch
 from galley.records import Store
 from galley.records.reading.overdue import under_way
 from galley.records.store.erase import finish_erasures
@@ -81,8 +81,8 @@ def preview(
         GalleyError: as `serve`.
     """
     settings = read_settings(os.environ if environ is None else environ, study=study, host=host, port=port)
-    with tempfile.TemporaryDirectory(prefix="galley-preview-") as folder:
-        database = str(Path(folder) / "preview.sqlite")
+    with Scratch("galley-preview-") as folder:
+        database = str(folder / "preview.sqlite")
         ended = _serve(Workspace(workspace), replace(settings, database=database), database, preview=True)
     _end(ended)
 

@@ -8,7 +8,6 @@ import random
 import re
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -24,6 +23,7 @@ from galley.agents.catalogue import Catalogue
 from galley.agents.protocol import Agent
 from galley.agents.scripted import Random
 from galley.errors import GalleyError
+from galley.files.scratch import Scratch
 from galley.kitchen import Layout
 from galley.kitchen.layout_file import load_layouts
 from galley.progress_lines import Progress, untold
@@ -83,8 +83,9 @@ def simulate(
         return _simulated(url.rstrip("/"), simulation, study, world, progress)
     with ExitStack() as stack:
         place = None if out is None else stack.enter_context(new_folder(out))
-        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="galley-simulate-")))
-        with own_server(workspace, simulation.study, folder) as own:
+        scratch = Scratch("galley-simulate-")
+        folder = stack.enter_context(scratch)
+        with own_server(workspace, simulation.study, scratch) as own:
             report = _simulated(own, simulation, study, world, progress)
         if out is not None and place is not None:
             written = write_simulated(folder / DATABASE, study.name, place, simulation.command())
@@ -180,19 +181,23 @@ def _params(study: Study, seed: int, number: int) -> dict[str, str]:
 
 
 @contextmanager
-def own_server(workspace: Workspace, study: str, folder: Path) -> Iterator[str]:
-    """The URL of a server in a process of its own until the block ends; its records are kept in `folder`.
+def own_server(workspace: Workspace, study: str, scratch: Scratch) -> Iterator[str]:
+    """The URL of a server in a process of its own until the block ends; its records are kept in `scratch`.
 
     Raises:
         GalleyError: it does not start; with what it said.
     """
-    log = folder / "log"
+    log = scratch.path / "log"
     command = [sys.executable, "-c", "from galley.cli import main; main()", "serve", str(workspace.path)]
-    command += ["--study", study, "--port", "0", "--database", str(folder / DATABASE)]
+    command += ["--study", study, "--port", "0", "--database", str(scratch.path / DATABASE)]
     with (
         log.open("wb") as out,
         subprocess.Popen(  # noqa: S603
-            command, stdout=out, stderr=subprocess.STDOUT, env={**os.environ, **UNLIMITED}
+            command,
+            stdout=out,
+            stderr=subprocess.STDOUT,
+            env={**os.environ, **UNLIMITED},
+            pass_fds=[scratch.descriptor],
         ) as process,
     ):
         try:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from galley.files.scratch import Scratch
 from galley.kitchen.trajectory import from_text
 from galley.records.reading import overview
 from galley.server.researcher import counts
@@ -18,6 +19,7 @@ from galley.server.researcher.downloads import DOWNLOADS
 from galley.server.researcher.export_process import write_export
 from galley.server.researcher.visit_pages import LONGEST_NOTE
 from tests.records.stored import stored_visit
+from tests.server.helpers import wait_until
 from tests.server.researcher.office import HOSTILE, NAME, START_MS, Office, csrf
 from tests.server.researcher.pilot import Pilot
 
@@ -247,6 +249,20 @@ def test_a_download_is_a_file_made_now(office: Office) -> None:
         people = list(csv.DictReader(io.StringIO(archive.read("participants.csv").decode("utf-8-sig"))))
     told = {person["participant"] for person in people}
     assert told == {visit.participant for name, visit in office.visits.items() if name != "test"}
+
+
+def test_a13_downloads_that_a_killed_server_left_go_with_the_next(
+    office: Office, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    left, others = tmp_path / "galley-export-abcdefgh", tmp_path / "galley-other"
+    for folder in (left, others):
+        folder.mkdir()
+        (folder / ".lock").touch()
+    at_work = Scratch("galley-export-")
+    answer = office.researcher().http.get("/researcher/studies/short/download/csv", timeout=120)
+    assert answer.status_code == 200
+    wait_until(lambda: set(tmp_path.iterdir()) == {others, at_work.path})
 
 
 @pytest.mark.parametrize("kind", DOWNLOADS)

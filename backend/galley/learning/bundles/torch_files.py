@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import sys
-import tempfile
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,6 +14,7 @@ from torch import nn
 
 from galley.agents.admission.adding import Converted
 from galley.errors import GalleyError
+from galley.files.scratch import Scratch
 from galley.learning.bundles.described_network import described_onnx, network_named
 from galley.learning.bundles.onnx_adapting import conform
 from galley.learning.bundles.onnx_writing import OPSET
@@ -137,8 +137,8 @@ def _exported(module: nn.Module, shape: tuple[int, ...]) -> Converted:
     """The module as ONNX, whatever its batch size turns out to be."""
     module.eval()
     axes = {"observation": {0: "B"}, "output": {0: "B"}}
-    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
-        path = Path(folder) / "policy.onnx"
+    with Scratch("galley-torch-") as folder, warnings.catch_warnings():
+        path = folder / "policy.onnx"
         warnings.simplefilter("ignore")  # tracing warns of what `conform` then finds out by trying
         try:
             torch.onnx.export(

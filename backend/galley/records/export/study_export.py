@@ -12,7 +12,7 @@ from typing import Any, Final
 from sqlalchemy import Connection, func, select
 
 from galley.errors import GalleyError
-from galley.files.whole import write_whole
+from galley.files.whole import clear_left, write_whole
 from galley.outcomes import RoundStatus
 from galley.records.database.tables import ABSENCES, ATTEMPTS, NOTES, RESPONSES, STAGES
 from galley.records.export.columns import (
@@ -88,6 +88,7 @@ def export_study(
         queries.must_know(connection, store.name, study)
         try:
             out.mkdir(parents=True, exist_ok=True)
+            clear_left(out)
             with ExitStack() as stack:
                 wide = Wide(connection, study)
                 sheets = [wide.sheet if sheet is WIDE else sheet for sheet in SHEETS]

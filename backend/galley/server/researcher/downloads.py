@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import json
-import shutil
 import subprocess
 import sys
-import tempfile
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -18,6 +16,7 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 
 from galley.errors import GalleyError
+from galley.files.scratch import Scratch
 from galley.film.write import can_draw
 from galley.records.rows import SessionRow
 from galley.records.store import queries
@@ -91,24 +90,24 @@ class DownloadPages:
 
     async def _made(self, session: SessionRow, job: dict[str, Any], name: str, media: str) -> Response:
         """The file that a process of its own makes of `job`, or a page that says why there is none."""
-        folder = Path(await asyncio.to_thread(tempfile.mkdtemp, prefix="galley-export-"))
+        scratch = await asyncio.to_thread(Scratch, "galley-export-")
         try:
-            out = folder / f"out{Path(name).suffix}"
+            out = scratch.path / f"out{Path(name).suffix}"
             job |= {"database": self._context.store.url, "out": str(out)}
             async with self._turns:
-                problem = await asyncio.to_thread(_in_a_process, job)
+                problem = await asyncio.to_thread(_in_a_process, job, scratch.descriptor)
         except BaseException:
-            await asyncio.to_thread(shutil.rmtree, folder, ignore_errors=True)
+            await asyncio.to_thread(scratch.close)
             raise
         if problem:
-            await asyncio.to_thread(shutil.rmtree, folder, ignore_errors=True)
+            await asyncio.to_thread(scratch.close)
             return self._context.logins.plain(session, 500, "No file was made", problem)
         return FileResponse(
             out,
             media_type=media,
             filename=name,
             headers={"cache-control": "no-store"},
-            background=BackgroundTask(shutil.rmtree, folder, ignore_errors=True),
+            background=BackgroundTask(scratch.close),
         )
 
 
@@ -116,12 +115,14 @@ def _stamp() -> str:
     return f"{datetime.now(UTC):%Y%m%d-%H%M%S}"
 
 
-def _in_a_process(job: dict[str, Any]) -> str:
+def _in_a_process(job: dict[str, Any], scratch: int) -> str:
     """Empty once the file is written, else what went wrong. The database's URL travels on standard input:
-    command lines are for everybody on the machine to read.
+    command lines are for everybody on the machine to read. The process holds the lock of its `scratch`.
     """
     command = [sys.executable, "-m", "galley.server.researcher.export_process"]
-    done = subprocess.run(command, input=json.dumps(job), capture_output=True, text=True, check=False)  # noqa: S603
+    done = subprocess.run(  # noqa: S603
+        command, input=json.dumps(job), capture_output=True, text=True, check=False, pass_fds=[scratch]
+    )
     if done.returncode == 0:
         return ""
     lines = done.stderr.strip().splitlines()
