@@ -75,13 +75,13 @@ class Shelf:
     def __init__(self, machine: Machine) -> None:
         self.machine = machine
         self.latest_ms: float | None = None
-        self.away = False
+        self.away: Exception | None = None
 
     def read(self, query: Callable[..., object]) -> object:
         loop = asyncio.get_running_loop()
         answer = loop.create_future()
-        if self.away:
-            answer.set_exception(GalleyError("away"))
+        if self.away is not None:
+            answer.set_exception(self.away)
         elif query is clocks.wall_time:
             answer.set_result(WallTime(self.machine.wall_s * 1000, self.machine.awake_s))
         else:
@@ -181,10 +181,11 @@ def test_a15_a_time_of_the_far_future_binds_nobody(machine: Machine) -> None:
     assert off_s(server.pages, machine) == pytest.approx(0, abs=0.01)
 
 
-def test_a15_while_the_database_is_away_times_go_on(machine: Machine) -> None:
+@pytest.mark.parametrize("away", [GalleyError("away"), ValueError("refused")])
+def test_a15_while_the_database_is_away_times_go_on(machine: Machine, away: Exception) -> None:
     server = Serving(machine)
     before_ms = server.rounds.ms()
-    server.store.away = True
+    server.store.away = away
     machine.passes(5)
     server.look()
     assert server.rounds.ms() - before_ms == pytest.approx(5000)

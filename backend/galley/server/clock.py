@@ -105,6 +105,9 @@ class Following:
         except GalleyError as error:
             LOG.warning("the clock could not be measured: %s", error)
             return
+        except Exception:  # whatever the database refuses, times go on and are measured again
+            LOG.exception("the clock could not be measured this time")
+            return
         clocks = (self._pages,) if self._playing() else (self._pages, self._rounds)
         for clock in clocks:
             clock.follow(wall, latest)
