@@ -13,7 +13,7 @@ BASE := $(VENV)/.base-installed
 ALL := $(VENV)/.all-installed
 KERNELS := $(VENV)/.kernels-compiled
 SOURCES := $(shell find backend/galley/compiled backend/galley/kitchen backend/galley/planning backend/galley/agents -name '*.py')
-JOBS ?= 2
+JOBS ?= 3
 NODE := node_modules/.installed
 
 help: ## list the targets
@@ -22,7 +22,7 @@ help: ## list the targets
 serve: $(BASE) ## set up without PyTorch, then serve the demo study (PORT=8000 DATABASE=sqlite:///file; STUDY= for all)
 	@$(GALLEY) serve . $(if $(STUDY),--study $(STUDY)) --port $(PORT) $(if $(DATABASE),--database '$(DATABASE)')
 
-test: $(ALL) $(KERNELS) ## set up everything, then run the tests (JOBS=2 at a time)
+test: $(ALL) $(KERNELS) ## set up everything, then run the tests (JOBS=3 at a time: many of them wait)
 	@sh tests/chromium.sh > /dev/null
 	@sh tests/postgres.sh
 	@sh tests/nginx.sh

@@ -19,6 +19,7 @@ VisitOutcome = Literal[
     "timed_out",
     "expired",
     "partner_missing",
+    "partner_lost",
     "interrupted",
 ]
 VISIT_OUTCOMES: Final[tuple[VisitOutcome, ...]] = get_args(VisitOutcome)
@@ -28,6 +29,7 @@ ENDED_FROM_OUTSIDE: Final[tuple[VisitOutcome, ...]] = (
     "timed_out",
     "expired",
     "partner_missing",
+    "partner_lost",
     "interrupted",
 )
 """How a visit may end wherever it is."""

@@ -12,6 +12,7 @@ import pytest
 
 from galley.agents.catalogue import Catalogue
 from galley.study.check import check_workspace
+from galley.study.written.hats import HAT_WORDS
 from galley.workspace import Workspace
 from tests.docs import reference
 
@@ -130,3 +131,9 @@ def test_each_dependency_says_why() -> None:
     names = {re.split(r"[\[<>=]", dependency)[0] for dependency in wanted} - {"galley"} | {"typescript"}
     told = set(re.findall(r"^\| `([^`]+)` \|", text("docs/libraries.md"), re.MULTILINE))
     assert told == names
+
+
+def test_d15_the_words_of_hats_are_those_of_the_pages() -> None:
+    """Files say reddish-purple, pages pink: the table of docs/first-study.md is the one that pages use."""
+    rows = re.findall(r"^\| `([a-z-]+)` \| ([a-z ]+) \|$", text("docs/first-study.md"), re.MULTILINE)
+    assert rows == [(colour, words.colour) for colour, words in HAT_WORDS.items()]

@@ -11,7 +11,7 @@ import pytest
 
 from galley.kitchen.codes import THINGS
 from galley.server.templates import translated_templates
-from galley.study.written.study_file import HATS
+from galley.study.written.hats import HATS
 from galley.study.written.texts import PICTURES, TILES
 from tests.frontend.pages import FRONTEND, Page
 

@@ -6,6 +6,7 @@ import jinja2
 from jinja2.runtime import Context
 
 from galley.server.base_path import Paths
+from galley.study.written.hats import HAT_WORDS
 from galley.translations import SOURCE, Catalogues, Translator, text_direction
 
 
@@ -29,6 +30,7 @@ def translated_templates(folder: str, catalogues: Catalogues | None = None) -> j
     environment = templates(folder)
     environment.add_extension("jinja2.ext.i18n")
     environment.filters["direction"] = text_direction
+    environment.globals["hat_words"] = HAT_WORDS
     known = Catalogues.load() if catalogues is None else catalogues
 
     def translator(context: Context) -> Translator:

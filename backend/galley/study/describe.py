@@ -10,6 +10,8 @@ from galley.study.stages.rounds_described import ORDERS
 from galley.study.stages.stage import stage_ids
 from galley.study.study import Study
 from galley.study.visit.condition_slots import capacity, cells
+from galley.study.written.hats import HAT_WORDS, Hat
+from galley.translations import Catalogues
 
 _ASSIGNED: Final = {
     "full": "every one equally often",
@@ -48,7 +50,8 @@ def _stages(study: Study) -> Iterator[str]:
 def _tail(study: Study) -> Iterator[str]:
     config = study.config
     hats = "drawn for each visit from" if config.hat_order == "random" else ORDERS[config.hat_order] + ":"
-    yield f"     hats, {hats}{'' if hats.endswith(':') else ':'} {', '.join(config.hats)}"
+    colours = ", ".join(_in_words(study, hat) for hat in config.hats)
+    yield f"     hats, {hats}{'' if hats.endswith(':') else ':'} {colours}"
     full = cells(config)
     if len(full) > 1:
         yield f"     {len(full)} cells: {'; '.join(', '.join(cell.values()) for cell in full)}"
@@ -76,6 +79,14 @@ def _tail(study: Study) -> Iterator[str]:
         code = getattr(config.endings, outcome).code
         if code is not None:
             yield f"     code when {outcome.replace('_', ' ')}: {code}"
+
+
+def _in_words(study: Study, hat: Hat) -> str:
+    """A colour with the words by which participants know it, in each language of the study."""
+    catalogues = Catalogues.load()
+    words = [catalogues.translator(code).gettext(HAT_WORDS[hat].colour) for code in study.languages]
+    known = dict.fromkeys(word for word in words if word != hat)
+    return f"{hat} ({' / '.join(known)})" if known else hat
 
 
 def _together(study: Study) -> Iterator[str]:

@@ -129,6 +129,8 @@ class Study:
             text = next(s.text for s in self.config.stages if s.kind == "debrief")
             return Ending(outcome, text, done.code, filled(done.redirect, done.code, link_params))
         end = getattr(self.config.endings, outcome)
+        if outcome == "partner_lost" and not end.model_fields_set:
+            end = self.config.endings.partner_missing
         return Ending(outcome, end.text, end.code, filled(end.redirect, end.code, link_params))
 
     def kept(self, link_params: Mapping[str, str]) -> dict[str, str]:

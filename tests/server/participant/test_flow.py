@@ -193,7 +193,7 @@ def test_invitations_let_in_whom_they_name_once(served: Served) -> None:
     assert Participant(served, "invited", "?code=abc-124").path != first.path
 
 
-def test_a_quiz_has_its_tries_and_a_form_sent_again_is_no_new_one(served: Served) -> None:
+def test_d17_a_quiz_has_its_tries_and_a_form_sent_again_is_no_new_one(served: Served) -> None:
     person = at_the_quiz(served, "q", "timed")
     assert "3 tries" in person.page.text
     for _ in range(3):

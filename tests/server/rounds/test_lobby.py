@@ -174,6 +174,29 @@ def test_when_nobody_comes_the_fallback_follows(served: Served, study: str, stag
         assert round_of(person).partner.agent == "myopic"
 
 
+def test_d8_whose_partner_left_before_ends_in_a_way_of_its_own(tmp_path: Path) -> None:
+    """Who never met anybody ends as partner_missing, with its code; after a round as partner_lost."""
+    kitchens = "layouts: [{layout: cramped_room}, {layout: coordination_ring}]"
+    two = PAIR.replace("layouts: [{layout: cramped_room}]", kitchens)
+    for endings, code in (
+        ("  partner_missing: {code: ALONE-1}\n  partner_lost: {code: LOST-1}\n", "LOST-1"),
+        ("  partner_missing: {code: ALONE-1}\n", "ALONE-1"),
+    ):
+        written = two.replace("  partner_missing: {code: ALONE-1}\n", endings)
+        lab = study_workspace(tmp_path / code, written)
+        with serving(lab, tmp_path / f"{code}.sqlite") as up:
+            first, second = waiting(up), waiting(up)
+            together(first, second)
+            first.load()
+            assert first.stage == "lobby"
+            first.submit({"leave": "1"})
+            assert (first.stage, row_of(first).status) == ("ending", "partner_lost")
+            assert code in first.page.text
+            alone = waiting(up)  # the second one is not there: its page asks no more
+            alone.submit({"leave": "1"})
+            assert row_of(alone).status == "partner_missing"
+
+
 def test_who_stopped_asking_is_not_paired_and_asking_again_brings_them_back(served: Served) -> None:
     first, second = waiting(served), None
     assert first.stage == "lobby"

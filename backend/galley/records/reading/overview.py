@@ -288,7 +288,7 @@ def _summaries(
     finished = (
         select(SEATS.c.visit_id, func.count())
         .join(ROUNDS, ROUNDS.c.id == SEATS.c.round_id)
-        .where(SEATS.c.visit_id.in_(ids), ROUNDS.c.status == "finished")
+        .where(SEATS.c.visit_id.in_(ids), ROUNDS.c.status == "finished", ROUNDS.c.round_no > 0)
         .group_by(SEATS.c.visit_id)
     )
     played = {row[0]: row[1] for row in connection.execute(finished)}

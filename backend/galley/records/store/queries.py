@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -89,6 +89,12 @@ def round_of(connection: Connection, visit_id: int, step_id: str) -> RoundRow | 
         select(SEATS.c.round_id).where(SEATS.c.visit_id == visit_id, SEATS.c.step_id == step_id)
     ).scalar_one_or_none()
     return None if found is None else round_row(connection, found)
+
+
+def met_somebody(connection: Connection, visit_id: int, steps: Sequence[str]) -> bool:
+    """Whether a visit was in a round with another person at one of these steps."""
+    rounds = (round_of(connection, visit_id, step) for step in steps)
+    return any(row is not None and all(seat.agent is None for seat in row.seats) for row in rounds)
 
 
 def rounds_of_visit(connection: Connection, visit_id: int) -> list[int]:

@@ -8,12 +8,14 @@ from dataclasses import dataclass
 from typing import Final
 from weakref import WeakValueDictionary
 
+from galley.outcomes import VisitOutcome
 from galley.records import Store
+from galley.records.store import queries
 from galley.records.store.pairing import Waits
 from galley.server.clock import Clock
 from galley.server.participant.visits import Visit, Visits
 from galley.server.rounds.matches import Matches
-from galley.study.stages.round_step import LobbyRules
+from galley.study.stages.round_step import LobbyRules, RoundStep
 from galley.study.visit.happenings import Ended, RoundEnded
 
 GONE_S: Final = 15.0
@@ -86,10 +88,19 @@ class Lobby:
             await self._matches.set_up(visit, rules.fallback_agent)
             return Meeting(waiting=False, begun=True, alone=True)
         if rules.without_partner == "exit":
-            await self._visits.happened(visit, Ended(visit.step.id, "partner_missing"))
+            outcome: VisitOutcome = "partner_lost" if await self._met_somebody(visit) else "partner_missing"
+            await self._visits.happened(visit, Ended(visit.step.id, outcome))
         else:
             await self._visits.happened(visit, RoundEnded(visit.step.id, "abandoned"))
         return Meeting(waiting=False)
+
+    async def _met_somebody(self, visit: Visit) -> bool:
+        """Whether the visit was in a round with another person before the one it is at."""
+        steps = visit.plan.steps[: visit.progress.step_index]
+        before = [step.id for step in steps if isinstance(step, RoundStep) and step.partner == "human"]
+
+        met = self._store.read(lambda connection: queries.met_somebody(connection, visit.row.id, before))
+        return await asyncio.wrap_future(met)
 
     def _lock(self, visit: Visit) -> asyncio.Lock:
         return self._locks.setdefault(visit.row.id, asyncio.Lock())

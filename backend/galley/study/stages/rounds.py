@@ -82,15 +82,17 @@ class Kitchen(FileModel):
 class Lobby(FileModel):
     """How participants of `human` rounds find each other, and what happens when one is not there.
 
-    `fallback` after `wait_s`: `exit` ends the visit as partner_missing, `go_on` leaves the round out, an
-    agent's name plays instead. `dropout` when the other one leaves: `end_round`, or an agent who takes over.
+    `fallback` after `wait_s`: `exit` ends the visit as partner_missing, or partner_lost after a round with
+    somebody; `go_on` leaves the round out and is the better choice where rounds were played before, for the
+    closing questions are still asked; an agent's name plays instead. `dropout` when the other one leaves:
+    `end_round`, or an agent who takes over.
     """
 
     wait_s: Seconds = 120
     """Seconds to wait for another participant."""
     fallback: Annotated[str, known_name("agent", "agents", *FALLBACKS)] = "exit"
-    """What follows then: `exit` ends the visit as partner_missing, `go_on` leaves the round out, an agent
-    plays instead."""
+    """What follows then: `exit` ends the visit as partner_missing or partner_lost, `go_on` leaves the round
+    out, an agent plays instead."""
     dropout: Annotated[str, known_name("agent", "agents", *DROPOUTS)] = "end_round"
     """What follows when the other one leaves for good: the round ends, or an agent takes over."""
 

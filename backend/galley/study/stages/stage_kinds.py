@@ -112,7 +112,8 @@ class QuizStep(QuestionnaireStep):
 class Quiz(QuestionsStage):
     """Questions with one right answer each, asked again until all are right or the tries are used up.
 
-    After a wrong answer the page shows the `hint` of its item.
+    After a wrong answer the page shows the `hint` of its item. The same wrong answers sent again, as by
+    loading the page again, are one try.
     """
 
     becomes = (QuizStep,)

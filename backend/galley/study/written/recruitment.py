@@ -82,6 +82,8 @@ class Endings(FileModel):
     """The visit was away too long and its slot was given to someone else."""
     partner_missing: EndingFile = EndingFile()
     """Nobody came to play with."""
+    partner_lost: EndingFile = EndingFile()
+    """Nobody came any more, after rounds with somebody; without keys of its own as `partner_missing`."""
     interrupted: EndingFile = EndingFile()
     """The visit needs a file that was changed or removed after it began."""
     full: EndingFile = EndingFile()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import product
 from math import prod
-from typing import Annotated, Any, Final, Literal, Self, get_args
+from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
@@ -26,12 +26,9 @@ from galley.study.written.factors import (
     names_differ,
     resolve,
 )
+from galley.study.written.hats import HATS, Hat
 from galley.study.written.languages import LanguageCode, Text, Words
 from galley.study.written.recruitment import Attention, Completion, Endings, Recruitment, unknown_places
-
-Hat = Literal["orange", "sky-blue", "bluish-green", "yellow", "blue", "vermillion", "reddish-purple"]
-HATS: Final[tuple[Hat, ...]] = get_args(Hat)
-"""Colours that colour-blind people can tell apart. Source: Okabe and Ito, Color Universal Design (2008)."""
 
 MOST_CELLS: Final = 1000
 Fault = tuple[Loc, str, str]
