@@ -63,7 +63,7 @@ mine: Good, about 11 minutes
        cells: 4 orders x 4 seatings
    6 comparison: questionnaire 'Your two partners', 3 items, comparing the two partners
    7 debrief: text 'Thank you for cooking'
-     hats, drawn for each visit from: orange, sky-blue (light blue), bluish-green (green), yellow, blue (dark blue), \
-vermillion (red), reddish-purple (pink)
+     hats, drawn for each visit from: orange, sky-blue (light blue), bluish-green (green), yellow, \
+blue (dark blue), vermillion (red), reddish-purple (pink)
      completion code: DONE"""
     )
