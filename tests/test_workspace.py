@@ -36,6 +36,7 @@ def test_things_are_found_by_name(workspace: Workspace) -> None:
         ("consent",),
         ("first",),
         ("wave-1",),
+        (),
     ]
     assert workspace.find("layouts", "ring") == workspace.path / "layouts" / "ring.yaml"
     assert workspace.find("agents", "shy") == workspace.path / "agents" / "shy"

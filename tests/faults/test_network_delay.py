@@ -80,7 +80,7 @@ def check_every_tick(store: Store, rounds: int, late: range) -> None:
     assert report.rounds == rounds
 
 
-@pytest.mark.parametrize("delay_ms", [0, 100, 400])
+@pytest.mark.parametrize("delay_ms", [0, 100, pytest.param(400, marks=pytest.mark.full)])
 def test_a_slow_line_costs_no_tick(served: Served, delay_ms: int) -> None:
     wanted = Simulation("slow", 2, seed=delay_ms, in_flight=2, delay_ms=delay_ms)
     report = simulate(served.workspace, wanted, served.url)

@@ -36,6 +36,8 @@ PLAYS = {
     "Caddy, sub-path taken off": "http://127.0.0.1:{caddy_prefix}/kitchen/",
     "Caddy, sub-path, https": "https://127.0.0.1:{caddy_prefix_tls}/kitchen/",
 }
+ALWAYS = ("nginx, Host without its port", "nginx, sub-path, https", "Caddy, https")
+"""Walked whole in a browser each time; the others with `make verify`."""
 BLOCKED = {
     "nginx, Host left out": ("http://127.0.0.1:{nginx_plain}/", "header Host"),
     "nginx, no websockets": ("http://127.0.0.1:{nginx_deaf}/", "websockets"),
@@ -96,6 +98,9 @@ def ports(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, int]]:
         yield there
 
 
+ABORTED = "net::ERR_ABORTED"
+
+
 @pytest.mark.parametrize("way", PLAYS)
 def test_f9_pages_files_forms_redirects_and_links_keep_to_the_base(ports: dict[str, int], way: str) -> None:
     """Every address in every page, a participant's and a researcher's, lies below the base and answers."""
@@ -151,7 +156,9 @@ def to_the_round(page: Page, root: str) -> None:
     assert page.locator("body").get_attribute("data-stage") == "round"
 
 
-@pytest.mark.parametrize("way", PLAYS)
+@pytest.mark.parametrize(
+    "way", [way if way in ALWAYS else pytest.param(way, marks=pytest.mark.full) for way in PLAYS]
+)
 def test_f8_f9_a_visit_in_a_browser_from_landing_to_code(
     browser: Browser, ports: dict[str, int], way: str
 ) -> None:

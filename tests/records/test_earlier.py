@@ -215,7 +215,13 @@ def comparable(name: str, rows: Rows, rounds: Rows, equal: set[Round]) -> Rows:
             without(row, CLOCK | CHANCE | {column for column in row if played_apart(row, column, equal)})
             for row in rows
         ]
-    return [without(row, CLOCK | CHANCE | RETOLD) for row in rows]
+    rows = [without(row, CLOCK | CHANCE | RETOLD) for row in rows]
+    return [row | {"flags": in_time(row["flags"])} if "flags" in row else row for row in rows]
+
+
+def in_time(flags: str) -> str:
+    """Flags without those that a busy machine earns."""
+    return " | ".join(flag for flag in flags.split(" | ") if flag not in ("late_agent", "slow_client"))
 
 
 def of(row: Mapping[str, str]) -> Round:

@@ -81,7 +81,7 @@ def test_d10_a_folder_that_is_not_empty_is_refused_before_anything_is_simulated(
     assert done.returncode == 2
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [pytest.param(signal.SIGINT, marks=pytest.mark.full), signal.SIGTERM])
 def test_d10_what_is_interrupted_leaves_nothing_behind(lab: Path, tmp_path: Path, number: int) -> None:
     (tmp_path / "tmp").mkdir()
     place = tmp_path / "pilot"

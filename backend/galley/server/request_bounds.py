@@ -24,6 +24,8 @@ MAX_UNREAD_BYTES: Final = 256 * 1024
 
 LINGER_S: Final = 2.0
 """How long the rest of a refused request is read and dropped, so that its sender sees the answer."""
+DROPPED_EVERY_S: Final = 0.02
+"""How often of it is read: what comes faster waits in the network, and takes no time from others."""
 
 
 class BoundedHttp(HttpToolsProtocol):
@@ -49,6 +51,7 @@ class BoundedHttp(HttpToolsProtocol):
     def data_received(self, data: bytes) -> None:
         """Take what came, unless the request was refused already."""
         if self._refused:
+            self._rest()
             return
         if self._timer is None:
             self._watch(HEAD_WITHIN_S)
@@ -153,3 +156,13 @@ class BoundedHttp(HttpToolsProtocol):
         if self.transport.can_write_eof():
             self.transport.write_eof()
         self._timer = self.loop.call_later(LINGER_S, self.transport.abort)
+
+    def _rest(self) -> None:
+        """Read on a little later."""
+        if not self.transport.is_closing():
+            self.transport.pause_reading()
+            self.loop.call_later(DROPPED_EVERY_S, self._read_on)
+
+    def _read_on(self) -> None:
+        if not self.transport.is_closing():
+            self.transport.resume_reading()

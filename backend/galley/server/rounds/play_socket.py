@@ -26,7 +26,7 @@ from galley.protocol.messages import (
     Release,
 )
 from galley.server.headers import same_origin, tell_foreign
-from galley.server.limits import REFUSED_AFTER_S, Pace, Paces, network_of
+from galley.server.limits import Pace, Paces, network_of
 from galley.server.participant.visits import Visits
 from galley.server.rounds.match import LEFT, RESTART
 from galley.server.rounds.matches import Matches, Place, RoundBusy
@@ -38,6 +38,8 @@ MAX_BEHIND = 200
 MOST_SOCKETS = 4
 SOCKETS_PER_S = 1.0
 SOCKETS_AT_ONCE = 20
+SOCKET_REFUSED_AFTER_S = 5.0
+"""How late a socket too many is refused: each costs a handshake, and who floods asks again at once."""
 HELLO_WITHIN_S = 20.0
 CLOSE_WITHIN_S = 5.0
 
@@ -143,7 +145,7 @@ class Play:
         token = websocket.path_params["token"]
         now_s = asyncio.get_running_loop().time()
         if self._arrivals.of(token, now_s).wait_s(now_s, patience_s=0.0) > 0:
-            await asyncio.sleep(REFUSED_AFTER_S)
+            await asyncio.sleep(SOCKET_REFUSED_AFTER_S)
             await websocket.send_denial_response(Response(status_code=429))
             return
         if not same_origin(websocket.headers):
