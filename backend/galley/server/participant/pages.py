@@ -62,6 +62,9 @@ NO_PAGE = mark("There is no page at this address. Please check that the link is 
 FOREIGN = mark("This form was sent from another site, so it was not used.")
 UNREADABLE = mark("This form could not be read, so nothing was changed.")
 TOO_LARGE: Final = 413
+BEGINS_PER_S: Final = 10.0
+BEGINS_AT_ONCE: Final = 5.0
+"""How visits that one address begins are spread: each is some milliseconds of work."""
 TOO_LONG = mark("Your answers are longer than this page takes. Please answer again in fewer words.")
 UNTESTED = mark(
     "This test link is not good any more. Please make a new one on the study's page for researchers."
@@ -98,6 +101,7 @@ class Pages:
         self._templates = templates
         self._max_form_bytes = max_form_bytes
         self._begins = Paces(begins_per_min / 60.0, burst=begins_per_min) if begins_per_min else None
+        self._one_by_one = Paces(BEGINS_PER_S, burst=BEGINS_AT_ONCE)
 
     def routes(self) -> list[Route]:
         """The routes of all pages."""
@@ -189,11 +193,20 @@ class Pages:
             page = self.plain(429, NOT_YET, CROWDED, language)
             page.headers["retry-after"] = str(math.ceil(wait_s))
             return page
+        await self._turn_of(request)
         params = _link_params(request)
         begun = await self._visits.begin(found, params, language)
         if not isinstance(begun, Visit):
             return self._not_begun(found.in_language(language), begun, params)
         return RedirectResponse(begun.url, 303, NEVER_CACHED)
+
+    async def _turn_of(self, request: Request) -> None:
+        """Wait for one's turn: a class that begins at once takes its time, not that of rounds in play."""
+        if self._begins is not None and request.client:
+            now_s = self._clock.now()
+            pace = self._one_by_one.of(network_of(request.client.host), now_s)
+            if (wait_s := pace.wait_s(now_s)) > 0:
+                await asyncio.sleep(wait_s)
 
     def _begin_wait_s(self, request: Request) -> float:
         """How long the address of a request has to wait until it may begin another visit."""
