@@ -62,7 +62,7 @@ NO_PAGE = mark("There is no page at this address. Please check that the link is 
 FOREIGN = mark("This form was sent from another site, so it was not used.")
 UNREADABLE = mark("This form could not be read, so nothing was changed.")
 TOO_LARGE: Final = 413
-BEGINS_PER_S: Final = 10.0
+BEGINS_PER_S: Final = 20.0
 BEGINS_AT_ONCE: Final = 5.0
 """How visits that one address begins are spread: each is some milliseconds of work."""
 TOO_LONG = mark("Your answers are longer than this page takes. Please answer again in fewer words.")
