@@ -10,7 +10,7 @@ from galley.study.stages.rounds_described import ORDERS
 from galley.study.stages.stage import stage_ids
 from galley.study.study import Study
 from galley.study.visit.condition_slots import capacity, cells
-from galley.study.written.hats import HAT_WORDS, Hat
+from galley.study.written.hats import HAT_WORDS
 from galley.translations import Catalogues
 
 _ASSIGNED: Final = {
@@ -50,7 +50,7 @@ def _stages(study: Study) -> Iterator[str]:
 def _tail(study: Study) -> Iterator[str]:
     config = study.config
     hats = "drawn for each visit from" if config.hat_order == "random" else ORDERS[config.hat_order] + ":"
-    colours = ", ".join(_in_words(study, hat) for hat in config.hats)
+    colours = ", ".join(_in_words(study))
     yield f"     hats, {hats}{'' if hats.endswith(':') else ':'} {colours}"
     full = cells(config)
     if len(full) > 1:
@@ -81,12 +81,14 @@ def _tail(study: Study) -> Iterator[str]:
             yield f"     code when {outcome.replace('_', ' ')}: {code}"
 
 
-def _in_words(study: Study, hat: Hat) -> str:
-    """A colour with the words by which participants know it, in each language of the study."""
+def _in_words(study: Study) -> Iterator[str]:
+    """The colours with the words by which participants know them, in each language of the study."""
     catalogues = Catalogues.load()
-    words = [catalogues.translator(code).gettext(HAT_WORDS[hat].colour) for code in study.languages]
-    known = dict.fromkeys(word for word in words if word != hat)
-    return f"{hat} ({' / '.join(known)})" if known else hat
+    speakers = [catalogues.translator(code) for code in study.languages]
+    for hat in study.config.hats:
+        words = (speaker.gettext(HAT_WORDS[hat].colour) for speaker in speakers)
+        known = dict.fromkeys(word for word in words if word != hat)
+        yield f"{hat} ({' / '.join(known)})" if known else hat
 
 
 def _together(study: Study) -> Iterator[str]:
